@@ -3,9 +3,8 @@
 import numpy as np
 
 from benchmarks.baked import FRONT
-from smokelift import Camera, DirectionalLight, Domain, Medium, Scene
+from smokelift import Camera, DirectionalLight, Domain, Medium, Scene, Velocity
 from smokelift.evaluation.truth import Truth
-from smokelift.transport import Velocity
 
 
 def cameras(size: tuple[int, int]) -> dict[str, Camera]:

@@ -8,15 +8,14 @@ import pytest
 
 from benchmarks.accuracy.scenes import REAL_FRAMES, REAL_SIZE, captured_scene
 from benchmarks.accuracy.score import best_gain
-from smokelift import Camera, ClipSource, Scene
+from smokelift import Camera, ClipSource, Domain, Scene
 from smokelift.output.images import write_image
-from smokelift.scene import Domain
 
 WIDTH, HEIGHT = 54, 96
 
 
 @pytest.fixture(scope="module")
-def capture(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def capture(tmp_path_factory) -> Path:
     """The folder of a capture with two further cameras at one place: 00 as bright as the input, 05 half so."""
     folder = tmp_path_factory.mktemp("capture")
     picture = np.zeros((HEIGHT, WIDTH, 3), np.float32)
@@ -37,7 +36,7 @@ def capture(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_every_camera_of_the_folder_is_scored_and_only_registered_ones_are_moved(capture: Path):
+def test_every_camera_of_the_folder_is_scored_and_only_registered_ones_are_moved(capture):
     calibrated, registered = (captured_scene(capture, registered=moved) for moved in (False, True))
     assert list(calibrated.cameras) == ["input", "camera00", "camera05"]
     assert list(registered.cameras) == ["input", "camera00"]  # nobody has registered camera 05

@@ -87,22 +87,17 @@ def test_what_is_composed_stays_and_is_not_taken_for_another_clip(smoke, folder,
         compose(Baked.load(folder, 3), "planks", Filming(), before_planks)
 
 
-def test_the_true_element_has_nothing_wrong(composed) -> None:
+def test_an_element_is_scored_by_its_imprint_its_tail_and_its_mass(composed) -> None:
+    """The true one has nothing wrong."""
     figures = score_element(composed.seen.transmittance, composed.seen.radiance, composed)
     assert figures["transmittance_error"] == figures["radiance_error"] == figures["imprint"] == 0
     assert (figures["thin_mass"], figures["tail"]) == pytest.approx((1, 1))
     assert figures["psnr"] > 100
-
-
-def test_a_plate_that_is_printed_on_the_smoke_is_an_imprint(composed) -> None:
     printed = composed.seen.transmittance + 0.1 * (composed.plate.mean(-1) - composed.plate.mean())
     figures = score_element(printed, composed.seen.radiance, composed)
     assert figures["imprint"] > 0.99
     noise = 0.01 * np.random.default_rng(0).standard_normal(composed.seen.transmittance.shape)
     assert score_element(composed.seen.transmittance + noise, composed.seen.radiance, composed)["imprint"] < 0.1
-
-
-def test_a_cut_tail_and_too_thin_smoke_are_seen(composed) -> None:
     clear = composed.seen.transmittance
     assert score_element(np.where(clear > 0.9, 1, clear), composed.seen.radiance, composed)["tail"] == 0
     assert score_element(0 * clear, composed.seen.radiance, composed)["tail"] == pytest.approx(1)

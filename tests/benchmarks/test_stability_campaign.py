@@ -51,16 +51,14 @@ def open_folder() -> Iterator[Path]:
         yield folder
 
 
-@pytest.mark.parametrize("name", [*DAMAGED, *EXTRACTED])
-def test_damaged_files_end_in_one_line(shot, tmp_path, name) -> None:
-    statuses, failed = failures(shot, name, 1, tmp_path)
+@pytest.mark.parametrize(
+    ("name", "number"),
+    [*((name, 0) for name in (*DAMAGED, *EXTRACTED)), *((name, n) for name, numbers in FOUND.items() for n in numbers)],
+)
+def test_damaged_files_end_in_one_line(shot, tmp_path, name, number) -> None:
+    statuses, failed = failures(shot, name, 1, tmp_path, first=number)
     assert failed == []
     assert sum(statuses.values()) == 1
-
-
-@pytest.mark.parametrize(("name", "number"), [(name, n) for name, numbers in FOUND.items() for n in numbers])
-def test_what_failed_once_fails_no_more(shot, tmp_path, name, number) -> None:
-    assert failures(shot, name, 1, tmp_path, first=number)[1] == []
 
 
 @pytest.mark.parametrize("name", ["full disk", "small memory", "cancelled", "killed"])

@@ -36,12 +36,9 @@ def pair():
     return built_in_pair(FINE, 0)
 
 
-def points(count: int) -> np.ndarray:
-    return np.random.default_rng(1).uniform(-0.25, 0.25, (3, count)).astype(np.float32)
-
-
 def test_the_velocity_has_no_divergence():
-    velocity, x, h = Flow.random(np.random.default_rng(0), 96).velocity, points(500), np.float32(2e-3)
+    velocity, h = Flow.random(np.random.default_rng(0), 96).velocity, np.float32(2e-3)
+    x = np.random.default_rng(1).uniform(-0.25, 0.25, (3, 500)).astype(np.float32)
     axes = np.eye(3, dtype=np.float32)[:, :, None]
     gradient = np.stack([(velocity(x + h * axis) - velocity(x - h * axis)) / (2 * h) for axis in axes])
     divergence = np.trace(gradient)

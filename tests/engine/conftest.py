@@ -7,22 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from smokelift import _core
+from smokelift import Background, Camera, ClipSource, DirectionalLight, Domain, Medium, Scene, Settings, _core
 from smokelift.output.images import write_image
 from smokelift.render import device, render
-from smokelift.scene import (
-    Background,
-    Camera,
-    ClipSource,
-    DirectionalLight,
-    Domain,
-    Medium,
-    Scene,
-    View,
-    look_at_matrix,
-    orbit,
-)
-from smokelift.setup.settings import Settings
+from smokelift.scene import CompleteScene, View, completed, look_at_matrix, orbit
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -56,7 +44,6 @@ class Plume:
     def blob(scene: Scene, height: float) -> np.ndarray:
         """The volume of a structured blob whose center is so many meters high; exactly 0 outside."""
         domain = scene.domain
-        assert domain is not None
         axes = [
             low + (np.arange(n) + 0.5) * domain.voxel_size for low, n in zip(domain.min, domain.resolution, strict=True)
         ]
@@ -71,7 +58,6 @@ class Plume:
     ) -> Scene:
         """Render volumes into a picture sequence; the scene with that clip."""
         scene = scene or self.scene
-        assert scene.camera is not None
         folder.mkdir(parents=True, exist_ok=True)
         for number, density in enumerate(densities):
             write_image(folder / f"frame_{number:04d}{suffix}", render(density, scene, scene.camera.at(number)))
@@ -79,7 +65,7 @@ class Plume:
 
 
 @pytest.fixture(scope="session")
-def plume(tmp_path_factory: pytest.TempPathFactory) -> Plume:
+def plume(tmp_path_factory) -> Plume:
     """The rising blob with its clip."""
     scene = Scene(
         camera=Camera.look_at((0, -4, 0.8), (0, 0, 0.8), fov_y_degrees=27, size=(40, 56)),
@@ -94,17 +80,21 @@ def plume(tmp_path_factory: pytest.TempPathFactory) -> Plume:
 
 
 @pytest.fixture(scope="session")
-def small(plume: Plume) -> Scene:
+def complete(plume) -> CompleteScene:
+    """Its scene with all that it leaves out."""
+    return completed(plume.scene)
+
+
+@pytest.fixture(scope="session")
+def small(plume) -> Scene:
     """Its scene without a clip, with a picture as fine as the grid."""
-    assert plume.scene.camera is not None
     return replace(plume.scene, camera=plume.scene.camera.resized(30, 42), clip=None)
 
 
 @pytest.fixture(scope="session")
-def tracked(plume: Plume, tmp_path_factory: pytest.TempPathFactory) -> Scene:
+def tracked(plume, tmp_path_factory) -> Scene:
     """The same blob from a camera that goes by, closer, upward and rolling a little."""
     camera = plume.scene.camera
-    assert camera is not None
     poses = [
         look_at_matrix((x, -4 + x, 0.8 + x / 2), (0.8 * x, 0, 0.8), (x / 4, 0, 1))
         for x in np.linspace(-0.25, 0.25, FRAMES)
@@ -114,15 +104,13 @@ def tracked(plume: Plume, tmp_path_factory: pytest.TempPathFactory) -> Scene:
 
 
 @pytest.fixture(scope="session")
-def two_views(plume: Plume, tmp_path_factory: pytest.TempPathFactory) -> Scene:
+def two_views(plume, tmp_path_factory) -> Scene:
     """The blob behind the middle of the box, from the front and from the side, whose clip began a frame earlier."""
     truth = [np.roll(density, 5, axis=1) for density in plume.densities]
     folder = tmp_path_factory.mktemp("two_views")
     front = plume.write(folder / "front", truth)
-    assert front.camera is not None and front.domain is not None
     camera = orbit(front.camera, front.domain, 90)
     side = plume.write(folder / "side", [np.zeros_like(truth[0]), *truth], replace(front, camera=camera)).clip
-    assert side is not None
     return replace(front, views=(View(camera, replace(side, frames=(1, FRAMES))),))
 
 
@@ -133,7 +121,7 @@ def draft() -> Settings:
 
 
 @pytest.fixture
-def set_threads(threads_of_a_worker: int) -> Iterator[Callable[[int], None]]:
+def set_threads(threads_of_a_worker) -> Iterator[Callable[[int], None]]:
     """Compute with a number of threads for the rest of a test."""
     yield _core.set_threads
     _core.set_threads(threads_of_a_worker)

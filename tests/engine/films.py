@@ -55,17 +55,14 @@ def grainy(pictures: Iterable[np.ndarray], noise: float, seed: int = 1) -> Itera
 
 def clip_of(folder: Path, pictures: Iterable[np.ndarray], suffix: str = ".png", **how: Any) -> Clip:
     """Write linear pictures, and open them as `Clip.open` does, by default with 24 frames per second."""
+    folder.mkdir(parents=True, exist_ok=True)
     for n, picture in enumerate(pictures):
         write_image(folder / f"frame_{n:03d}{suffix}", picture)
     return Clip.open(folder / f"frame_###{suffix}", **{"fps": 24, **how})
 
 
 def film(
-    folder: Path,
-    plate: np.ndarray,
-    opacity: Callable[[int], np.ndarray],
-    color: float | np.ndarray,
-    noise: float = 1.0,
+    folder: Path, plate: np.ndarray, opacity: Callable[[int], np.ndarray], color: float | np.ndarray, noise: float = 1.0
 ) -> Clip:
     """Write and open a clip of smoke of a color before a plate, with sensor noise in 8 bit codes."""
     return clip_of(folder, grainy((before(plate, opacity(n), color) for n in range(COUNT)), noise))

@@ -3,7 +3,6 @@
 import os
 import signal
 import threading
-from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -15,7 +14,7 @@ FACES = tuple(np.random.default_rng(0).random(shape, np.float32) for shape in fa
 """Enough slabs for every thread, and so few voxels that a call is short."""
 
 
-def test_calls_at_the_same_time_have_threads_of_their_own(set_threads: Callable[[int], None]) -> None:
+def test_calls_at_the_same_time_have_threads_of_their_own(set_threads) -> None:
     set_threads(3)
     expected, wrong = _core.divergence(FACES), []
 
@@ -32,7 +31,7 @@ def test_calls_at_the_same_time_have_threads_of_their_own(set_threads: Callable[
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="This system cannot fork.")
 @pytest.mark.filterwarnings("ignore:.*multi-threaded.*fork:DeprecationWarning")
-def test_a_fork_computes_as_its_parent_does_even_amid_a_call(set_threads: Callable[[int], None]) -> None:
+def test_a_fork_computes_as_its_parent_does_even_amid_a_call(set_threads) -> None:
     set_threads(2)
     expected, ended = _core.divergence(FACES), threading.Event()
 

@@ -5,7 +5,6 @@ import io
 import re
 import runpy
 import sys
-from pathlib import Path
 
 import pytest
 
@@ -36,7 +35,7 @@ def test_every_package_with_constants_set_by_hand_says_what_would_move_them() ->
 
 @pytest.mark.parametrize(("module", "words"), COMMANDS, ids=[module for module, _ in COMMANDS])
 @pytest.mark.filterwarnings("ignore:.*found in sys.modules:RuntimeWarning")
-def test_a_sweep_has_the_options_that_are_said(module: str, words: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_sweep_has_the_options_that_are_said(module, words, monkeypatch) -> None:
     monkeypatch.setattr(sys, "argv", [module, "--help"])
     said = io.StringIO()
     with contextlib.redirect_stdout(said), pytest.raises(SystemExit) as ended:
@@ -45,7 +44,7 @@ def test_a_sweep_has_the_options_that_are_said(module: str, words: str, monkeypa
     assert set(re.findall(r"--[a-z]+", words)) <= set(re.findall(r"--[a-z]+", said.getvalue()))
 
 
-def test_a_constant_without_a_meaning_or_a_source_is_seen(tmp_path: Path) -> None:
+def test_a_constant_without_a_meaning_or_a_source_is_seen(tmp_path) -> None:
     module = tmp_path / "module.py"
     module.write_text(
         '"""A module."""\n'
@@ -62,7 +61,7 @@ def test_a_constant_without_a_meaning_or_a_source_is_seen(tmp_path: Path) -> Non
     ]
 
 
-def test_a_module_may_name_the_source_of_its_constants(tmp_path: Path) -> None:
+def test_a_module_may_name_the_source_of_its_constants(tmp_path) -> None:
     module = tmp_path / "module.py"
     module.write_text(
         '"""Costs.\n\nConstants that say no other source:\ndocs/experiments/memory-and-time.md.\n"""\n'

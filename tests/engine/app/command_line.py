@@ -45,5 +45,14 @@ def events(text: str) -> list[dict[str, Any]]:
     return [json.loads(line, parse_constant=refuse) for line in text.splitlines()]
 
 
+def events_of(capsys: pytest.CaptureFixture[str], *words: object) -> list[dict[str, Any]]:
+    """The events of a command that comes to its end."""
+    capsys.readouterr()
+    assert command(*words, "--progress", "json") == 0
+    captured = capsys.readouterr()
+    assert captured.err == ""
+    return events(captured.out)
+
+
 def names(directory: Path) -> list[str]:
     return sorted(path.name for path in directory.iterdir())

@@ -61,8 +61,6 @@ def test_a_cancelled_run_can_be_resumed(plume, tmp_path, monkeypatch, capsys) ->
         # a test run in the background may ignore SIGINT, which children inherit
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     ) as process:
-        assert process.stdout is not None
-        assert process.stderr is not None
         for line in process.stdout:
             if json.loads(line)["event"] == "frame":
                 process.send_signal(signal.SIGINT)

@@ -28,12 +28,6 @@ def before_wall(plume, tmp_path_factory) -> Iterator[Path]:
     return folder / "scene.toml"
 
 
-def rgba(path: Path) -> np.ndarray:
-    """The pixels of an EXR with alpha."""
-    (part,) = OpenEXR.File(str(path)).parts
-    return np.asarray(part.channels["RGBA"].pixels, np.float32)
-
-
 def test_elements_are_numbered_as_the_frames_of_the_file(before_wall, tmp_path) -> None:
     words = ("extract", before_wall, "--frames", "1:2", "--out", tmp_path / "element_###.exr")
     assert command(*words, "--plate", tmp_path / "plate.exr", "--preview", tmp_path / "check.png") == 0
@@ -42,7 +36,8 @@ def test_elements_are_numbered_as_the_frames_of_the_file(before_wall, tmp_path) 
     with Clip.open(scene.clip, frames=(1, 2)) as clip:
         seen = clip.frame(1)
         _, element = extract(clip, scene)
-    pixels = rgba(tmp_path / "element_002.exr")
+    (part,) = OpenEXR.File(str(tmp_path / "element_002.exr")).parts
+    pixels = np.asarray(part.channels["RGBA"].pixels, np.float32)
     assert 0.5 < pixels[..., 3].max() <= 1 and pixels[:8, :8, 3].max() < 0.05
     over = pixels[..., :3] + (1 - pixels[..., 3:]) * plate
     assert np.sqrt(np.mean((over - seen) ** 2)) < 0.02

@@ -5,12 +5,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from command_line import QUICK, command, events, refused
+from command_line import QUICK, command, events_of, refused
 
+from smokelift import Background, Scene, Sequence
 from smokelift.footage.images import read_image
 from smokelift.output.images import write_image
-from smokelift.output.sequence import Sequence
-from smokelift.scene import Background, Scene
 from smokelift.setup.settings import QUALITIES
 
 
@@ -20,8 +19,7 @@ def test_choices_are_said_and_kept(shot, finished, capsys) -> None:
         "resolution", "scattering", "velocity grid coarsening",
         "axis depth",
     ]  # fmt: skip
-    assert command("inspect", shot, "--progress", "json", *QUICK) == 0
-    *notes, done = events(capsys.readouterr().out)
+    *notes, done = events_of(capsys, "inspect", shot, *QUICK)
     assert done["choices"] == list(kept)
     said = [event["text"] for event in notes]
     assert all(choice["reason"] in said for choice in kept)
@@ -35,9 +33,7 @@ def test_every_quality_is_forecast(plume, tmp_path, capsys) -> None:
     replace(plume.scene, camera=None, domain=None).save(path)
 
     def forecast(*words: str) -> dict[str, Any]:
-        assert command("inspect", path, "--progress", "json", "--frames", "0:2", *words) == 0
-        *_, done = events(capsys.readouterr().out)
-        return done
+        return events_of(capsys, "inspect", path, "--frames", "0:2", *words)[-1]
 
     done = forecast("--quality", "draft")
     assert list(done["qualities"]) == list(QUALITIES)
@@ -57,8 +53,7 @@ def test_every_quality_is_forecast(plume, tmp_path, capsys) -> None:
 def test_pages_show_what_is_known(plume, tmp_path, capsys) -> None:
     pages = tmp_path / "page.png", tmp_path / "page.html"
     words = [word for page in pages for word in ("--page", page)]
-    assert command("inspect", plume.scene.clip.path, *words, "--progress", "json", *QUICK) == 0
-    done = events(capsys.readouterr().out)[-1]
+    done = events_of(capsys, "inspect", plume.scene.clip.path, *words, *QUICK)[-1]
     assert done["files"] == list(map(str, pages))
     assert all(page.stat().st_size > 5000 for page in pages)
     assert "sun&#x27;s direction" in pages[1].read_text(encoding="utf-8")
@@ -73,8 +68,7 @@ def test_pages_show_what_is_known(plume, tmp_path, capsys) -> None:
 def test_a_clip_without_smoke_has_a_page_that_says_so(plume, tmp_path, capsys) -> None:
     plume.write(tmp_path / "clip", [np.zeros_like(plume.densities[0])] * 2)
     clip, page = tmp_path / "clip" / "frame_####.png", tmp_path / "page.html"
-    assert command("inspect", clip, "--page", page, "--progress", "json", *QUICK) == 0
-    *notes, done = events(capsys.readouterr().out)
+    *notes, done = events_of(capsys, "inspect", clip, "--page", page, *QUICK)
     kinds = [event["kind"] for event in notes]
     assert "no smoke examined" in kinds and "box over the picture" in kinds
     assert '<p class="warning">No smoke found' in page.read_text(encoding="utf-8")

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from command_line import QUICK, command, events, names, refused
+from command_line import QUICK, command, events_of, names, refused
 
 from smokelift.output.sequence import Sequence
 from smokelift.scene import completed
@@ -45,10 +45,7 @@ def test_files_are_numbered_as_the_clip_and_every_command_goes_on(shot, tmp_path
 def test_progress_as_json(plume, tmp_path, capsys) -> None:
     replace(plume.scene, medium=None).save(tmp_path / "scene.toml")
     out = tmp_path / "out"
-    assert command("reconstruct", tmp_path / "scene.toml", "--out", out, "--npz", "--progress", "json", *QUICK) == 0
-    captured = capsys.readouterr()
-    sent = events(captured.out)
-    assert captured.err == ""
+    sent = events_of(capsys, "reconstruct", tmp_path / "scene.toml", "--out", out, "--npz", *QUICK)
     notes = [event["kind"] for event in sent if event["event"] == "note"]
     assert [event["event"] for event in sent] == [*["note"] * len(notes), "start", *["frame"] * 5, "done"]
     medium = sent[notes.index("assumed medium")]

@@ -67,9 +67,7 @@ def test_a_run_that_cannot_be_is_refused_before_anything_is_written(here, shot, 
         (("--out", "others", "--thumbnail", "others/a.png", "--resume"), "holds other files"),
     ],
 )
-def test_what_cannot_be_written_is_refused_before_the_clip_is_read(
-    here, shot, capsys, monkeypatch, words, said
-) -> None:
+def test_what_cannot_be_written_is_refused_before_the_clip_is_read(here, shot, capsys, monkeypatch, words, said):
     def look(*_arguments: object) -> None:
         raise AssertionError("the clip was read")
 

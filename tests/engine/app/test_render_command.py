@@ -4,11 +4,9 @@ import numpy as np
 import pytest
 from command_line import command, refused
 
-from smokelift.footage.clip import Clip
+from smokelift import Clip, Sequence, render
 from smokelift.footage.images import read_image
 from smokelift.output.images import eight_bit
-from smokelift.output.sequence import Sequence
-from smokelift.render import render
 from smokelift.scene import Camera, Scene, orbit
 
 

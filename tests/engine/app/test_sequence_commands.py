@@ -4,7 +4,7 @@ import json
 import shutil
 
 import pytest
-from command_line import command, events, names, refused
+from command_line import command, events_of, names, refused
 
 from smokelift.app.commands import directed
 from smokelift.direct.continuation import CONTRADICTED, ROOM, Continuation, continue_sequence
@@ -14,8 +14,7 @@ from tests.engine.output.small_sequence import needs_vdb
 
 
 def test_a_whole_sequence_passes(finished, capsys) -> None:
-    assert command("check", finished, "--progress", "json") == 0
-    last = json.loads(capsys.readouterr().out.splitlines()[-1])
+    last = events_of(capsys, "check", finished)[-1]
     assert (last["event"], last["frames"], last["empty"]) == ("done", 5, 0)
 
 
@@ -41,8 +40,7 @@ def test_what_is_damaged_or_missing_fails(finished, tmp_path, capsys, name, dama
 @needs_vdb
 def test_every_frame_gets_a_coarse_copy(finished, tmp_path, capsys) -> None:
     there = shutil.copytree(finished, tmp_path / "there")
-    assert command("proxy", there, "--progress", "json") == 0
-    start, *frames, done = events(capsys.readouterr().out)
+    start, *frames, done = events_of(capsys, "proxy", there)
     assert start["total"] == len(frames) == done["frames"]
     assert set(names(there)) - set(names(finished)) == {f"proxy_{frame['frame']:04d}.vdb" for frame in frames}
     assert "no sequence" in refused(capsys, "proxy", tmp_path)
@@ -51,13 +49,11 @@ def test_every_frame_gets_a_coarse_copy(finished, tmp_path, capsys) -> None:
 @needs_vdb
 def test_the_size_is_said_before(finished, tmp_path, capsys) -> None:
     out = tmp_path / "out"
-    words = ("export", finished, "--out", out, "--precision", "quantized", "--proxy", 2, "--progress", "json")
-    assert command(*words, "--size") == 0
-    (sent,) = events(capsys.readouterr().out)
+    words = ("export", finished, "--out", out, "--precision", "quantized", "--proxy", 2)
+    (sent,) = events_of(capsys, *words, "--size")
     assert sent["event"] == "done" and sent["size"] > 0
     assert not out.exists()
-    assert command(*words) == 0
-    note, start, *frames, done = events(capsys.readouterr().out)
+    note, start, *frames, done = events_of(capsys, *words)
     assert "MB" in note["text"] and start["total"] == len(frames) == done["frames"]
     assert done["size"] == pytest.approx(sent["size"], rel=0.2)
     assert len(names(out)) == 2 * done["frames"] + 2
@@ -68,13 +64,12 @@ def test_the_size_is_said_before(finished, tmp_path, capsys) -> None:
 
 def test_retime_and_loop_write_every_frame(finished, tmp_path, capsys) -> None:
     slow, loop = tmp_path / "slow", tmp_path / "loop"
-    assert command("retime", finished, "--out", slow, "--speed", 0.5, "--npz", "--progress", "json") == 0
-    start, *_, done = events(capsys.readouterr().out)
+    start, *_, done = events_of(capsys, "retime", finished, "--out", slow, "--speed", 0.5, "--npz")
     assert start == {"event": "start", "total": 9, "done": 0}
     assert done["frames"] == len(list(slow.glob("*.npz"))) == 9
     assert "no longer those of the clip" in refused(capsys, "evaluate", slow)
-    assert command("loop", finished, "--out", loop, "--overlap", 1, "--npz", "--progress", "json") == 0
-    assert events(capsys.readouterr().out)[-1]["frames"] == len(list(loop.glob("*.npz")))
+    looped = events_of(capsys, "loop", finished, "--out", loop, "--overlap", 1, "--npz")
+    assert looped[-1]["frames"] == len(list(loop.glob("*.npz")))
 
 
 def test_continue_adds_frames(finished, tmp_path, capsys) -> None:
@@ -82,8 +77,7 @@ def test_continue_adds_frames(finished, tmp_path, capsys) -> None:
     words = ("continue", finished, "--out", out, "--frames", 3, "--npz", "--fade", 1, "--wind", 0.2, -0.1, 0)
     words += ("--turbulence", 0.3, 0.6, 1, "--turbulence", 0.1, 0.9, 2, "--closed", "z-", "x+")
     words += ("--buoyancy", -0.5, "--dissipation", 0.1)
-    assert command(*words, "--progress", "json") == 0
-    said = events(capsys.readouterr().out)
+    said = events_of(capsys, *words)
     assert said[-1]["event"] == "done"
     assert said[-1]["frames"] == len([event for event in said if event["event"] == "frame"])
     assert len([name for name in names(out) if name.endswith(".npz")]) == said[-1]["frames"]
@@ -99,9 +93,7 @@ def test_what_is_resumed_is_counted_whole(finished, tmp_path, capsys) -> None:
     index = json.loads((out / "sequence.json").read_text())
     index["frames"]["1"]["seconds_density"] = index["frames"][str(number)]["seconds_velocity"] = 1000.0
     (out / "sequence.json").write_text(json.dumps(index))
-    words = ("continue", finished, "--out", out, "--npz", "--frames", 3, "--resume", "--progress", "json")
-    assert command(*words) == 0
-    start, *_, done = events(capsys.readouterr().out)
+    start, *_, done = events_of(capsys, "continue", finished, "--out", out, "--npz", "--frames", 3, "--resume")
     assert (start["done"], start["total"]) == (number, number + 2)
     assert 1000 < done["seconds"] < 2000
 
@@ -111,8 +103,7 @@ def test_one_sentence_says_what_stops_a_continuation(finished, tmp_path, capsys,
 
     def said(*words: object) -> list[str]:
         start = ("continue", finished, "--out", tmp_path / "out", "--npz", "--frames", 8, "--wind", 6, 0, 0)
-        assert command(*start, *words, "--progress", "json") == 0
-        return [event["text"] for event in events(capsys.readouterr().out) if event["event"] == "note"]
+        return [event["text"] for event in events_of(capsys, *start, *words) if event["event"] == "note"]
 
     (sentence,) = said("--room", 1)
     assert "dissolves" in sentence and "more room than 1" in sentence

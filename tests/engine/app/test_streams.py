@@ -27,6 +27,12 @@ def ended(*words: str | bytes, **options: Any) -> tuple[int, list[str]]:
     return done.returncode, done.stderr.decode("ascii").splitlines()
 
 
+def ended_python(code: str) -> tuple[int, bytes]:
+    """Status and standard error of some lines of Python in a process of their own."""
+    done = subprocess.run([sys.executable, "-c", code], env=ENVIRONMENT, capture_output=True, timeout=60, check=False)
+    return done.returncode, done.stderr
+
+
 def test_a_closed_pipe_cancels_and_a_full_disk_is_bad_output() -> None:
     read, write = os.pipe()
     os.close(read)
@@ -39,10 +45,7 @@ def test_a_closed_pipe_cancels_and_a_full_disk_is_bad_output() -> None:
 
 
 def test_control_characters_of_a_path_are_spelt_out(capsys) -> None:
-    for path, spelt in (
-        ("a\nb.toml", r"a\nb.toml"),
-        ("\x1b]0;owned\x07\x9b31m.toml", r"\x1b]0;owned\x07\x9b31m.toml"),
-    ):
+    for path, spelt in (("a\nb.toml", r"a\nb.toml"), ("\x1b]0;owned\x07\x9b31m.toml", r"\x1b]0;owned\x07\x9b31m.toml")):
         assert refused(capsys, "inspect", path) == f"{spelt}: cannot be read: No such file or directory"
     assert printable_lines("two\nlines, räuchern, 烟") == "two\nlines, räuchern, 烟"
     status, lines = ended("inspect", "räuchern.toml", env={**ENVIRONMENT, "PYTHONIOENCODING": "ascii"})
@@ -65,8 +68,7 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 sys.meta_path.insert(0, Finder())
 sys.exit(smokelift_command.main())
 """
-    done = subprocess.run([sys.executable, "-c", code], env=ENVIRONMENT, capture_output=True, timeout=60, check=False)
-    assert (done.returncode, done.stderr) == (130, b"Cancelled.\n")
+    assert ended_python(code) == (130, b"Cancelled.\n")
 
 
 def test_the_engine_of_a_batch_loads_while_its_input_is_held_and_ends_with_it() -> None:
@@ -95,7 +97,6 @@ sys.exit(tethered.main())
 """
     pipes: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     with subprocess.Popen([sys.executable, "-c", code], env=ENVIRONMENT, **pipes) as process:
-        assert process.stdout is not None
         assert process.stdout.readline().split() == [b"working"]
         assert process.communicate(timeout=60)[1].split() == [b"Cancelled."]
         assert process.returncode == 130
@@ -112,8 +113,7 @@ assert sys.excepthook is sys.__excepthook__
 assert handlers == [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]
 assert environment == dict(os.environ)
 """
-    done = subprocess.run([sys.executable, "-c", code], env=ENVIRONMENT, capture_output=True, timeout=60, check=False)
-    assert (done.returncode, done.stderr) == (0, b"")
+    assert ended_python(code) == (0, b"")
 
 
 def of_system(number: int, path: str | None = None) -> OSError:

@@ -26,7 +26,7 @@ def fake() -> tuple[str, ...]:
 
 
 @pytest.fixture
-def make_shot(tmp_path: Path) -> Callable[..., BatchShot]:
+def make_shot(tmp_path) -> Callable[..., BatchShot]:
     """Make a shot of so many frames; see `fake_engine`."""
 
     def make(
@@ -59,7 +59,7 @@ def until() -> Callable[[Callable[[], object]], None]:
 
 
 @pytest.fixture
-def engines(tmp_path: Path) -> Iterator[Callable[[], list[psutil.Process]]]:
+def engines(tmp_path) -> Iterator[Callable[[], list[psutil.Process]]]:
     """Find the fake engines of this test's shots that are alive, whoever their parents are now."""
 
     def alive() -> list[psutil.Process]:

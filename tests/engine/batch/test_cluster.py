@@ -84,16 +84,14 @@ class Cluster:
 
 
 @pytest.fixture
-def cluster(tmp_path: Path) -> Iterator[Cluster]:
+def cluster(tmp_path) -> Iterator[Cluster]:
     made = Cluster(tmp_path)
     yield made
     made.close()
 
 
 @posix
-def test_a_killed_worker_or_scheduler_neither_loses_nor_repeats_frames(
-    cluster, make_shot, tmp_path, ledger, until
-) -> None:
+def test_a_killed_worker_or_scheduler_neither_loses_nor_repeats_frames(cluster, make_shot, tmp_path, ledger, until):
     """A worker and the scheduler are killed while shots run, and the storage is full for a while."""
     full = tmp_path / "full"
     full.touch()

@@ -36,21 +36,32 @@ def finished(shot: BatchShot) -> bool:
     return is_finished(shot, read_record(shot))
 
 
-def test_a_finished_shot_is_run_again_only_if_its_options_or_its_clip_changed(make_shot, fake, ledger) -> None:
+@pytest.fixture
+def finish(fake):
+    """Work on a shot with the fake engine until it comes to an end."""
+    return functools.partial(finish_shot, stop=threading.Event(), engine=fake)
+
+
+def test_a_finished_shot_is_run_again_only_if_its_options_or_its_clip_changed(make_shot, finish, ledger) -> None:
     shot = make_shot(frames=3)
-    record = finish_shot(shot, threading.Event(), engine=fake)
+    record = finish(shot)
     assert (record.status, record.sentence, record.notes) == ("done", "Finished.", ["A fake."])
-    again = finish_shot(shot, threading.Event(), engine=fake)
+    again = finish(shot)
     assert (again.runs, ledger(shot)) == (1, [1, 2, 3])
     assert finished(shot) and not finished(replace(shot, options=("--quality=fine",)))
     shot.input.write_text(shot.input.read_text() + " ")
     assert not finished(shot)
 
 
-def test_after_a_crash_the_shot_goes_on(make_shot, fake, ledger) -> None:
-    shot = make_shot(frames=4, n3="crash")
-    record = finish_shot(shot, threading.Event(), engine=fake)
-    assert (record.status, record.runs, ledger(shot)) == ("done", 2, [1, 2, 3, 4])
+@pytest.mark.parametrize(
+    ("end", "status", "runs", "sentence", "done"),
+    [("crash", "done", 2, "Finished.", [1, 2, 3, 4]), ("refuse", "refused", 1, "It cannot be done.", [1, 2])],
+)
+def test_a_crash_is_tried_again_and_a_refusal_is_not(make_shot, finish, ledger, end, status, runs, sentence, done):
+    shot = make_shot(frames=4, n3=end)
+    record = finish(shot)
+    assert (record.status, record.runs, record.sentence) == (status, runs, sentence)
+    assert ledger(shot) == done
 
 
 def test_a_crash_is_tried_again_twice(make_shot) -> None:
@@ -62,13 +73,7 @@ def test_a_crash_is_tried_again_twice(make_shot) -> None:
     assert shot.file("log").read_text().count("no such thing") == 3
 
 
-def test_what_the_engine_refuses_is_not_tried_again(make_shot, fake) -> None:
-    shot = make_shot(n2="refuse")
-    record = finish_shot(shot, threading.Event(), engine=fake)
-    assert (record.status, record.runs, record.sentence) == ("refused", 1, "It cannot be done.")
-
-
-def test_a_full_disk_is_waited_for(make_shot, fake, tmp_path, ledger) -> None:
+def test_a_full_disk_is_waited_for(make_shot, finish, tmp_path, ledger) -> None:
     full = tmp_path / "full"
     full.touch()
     shot = make_shot(n2=str(full))
@@ -79,12 +84,12 @@ def test_a_full_disk_is_waited_for(make_shot, fake, tmp_path, ledger) -> None:
         if len(said) == 2:
             full.unlink()
 
-    record = finish_shot(shot, threading.Event(), hear, 0.05, fake)
+    record = finish(shot, say=hear, pause=0.05)
     assert (record.status, ledger(shot)) == ("done", [1, 2, 3])
     assert said[0] == "shot: The disk is full. It is tried again in 0 s."
 
 
-def test_a_full_disk_is_waited_for_as_long_as_frames_come(make_shot, fake, tmp_path, ledger, monkeypatch) -> None:
+def test_a_full_disk_is_waited_for_as_long_as_frames_come(make_shot, finish, tmp_path, ledger, monkeypatch) -> None:
     """One try is allowed here without a new frame."""
     monkeypatch.setitem(RETRIES, "stuck", 1)
     first, second = tmp_path / "first", tmp_path / "second"
@@ -96,21 +101,14 @@ def test_a_full_disk_is_waited_for_as_long_as_frames_come(make_shot, fake, tmp_p
         said.append(text)
         first.unlink(missing_ok=True)
 
-    record = finish_shot(shot, threading.Event(), hear, 0.0, fake)
+    record = finish(shot, say=hear, pause=0.0)
     assert (record.status, record.runs, len(said), ledger(shot)) == ("stuck", 3, 2, [1, 2])
 
 
-def test_two_that_work_on_one_shot_do_it_once(make_shot, fake, ledger) -> None:
+def test_two_that_work_on_one_shot_do_it_once(make_shot, finish, ledger) -> None:
     shot = make_shot(frames=4, seconds=0.05)
-    records = []
-    threads = [
-        threading.Thread(target=lambda: records.append(finish_shot(shot, threading.Event(), pause=0.05, engine=fake)))
-        for _ in range(3)
-    ]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
+    with ThreadPoolExecutor(3) as pool:
+        records = list(pool.map(functools.partial(finish, pause=0.05), [shot] * 3))
     assert [record.status for record in records] == ["done"] * 3
     assert ledger(shot) == [1, 2, 3, 4]
 
@@ -161,11 +159,7 @@ DONE = Record(of={}, status="done")
 @pytest.fixture
 def shots(make_shot):
     """Make shots that need so much memory each."""
-
-    def make(*needs: int):
-        return {make_shot(f"shot{n}"): memory for n, memory in enumerate(needs)}
-
-    return make
+    return lambda *needs: {make_shot(f"shot{n}"): memory for n, memory in enumerate(needs)}
 
 
 class Worker:

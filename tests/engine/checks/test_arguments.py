@@ -34,7 +34,7 @@ def nonsense(value: Any) -> Any:
 
 
 @pytest.fixture
-def clip(tmp_path: Path) -> Iterator[Clip]:
+def clip(tmp_path) -> Iterator[Clip]:
     for number in range(2):
         write_image(tmp_path / f"frame_{number}.png", PICTURE)
     with Clip.open(ClipSource(tmp_path / "frame_#.png", fps=24)) as opened:
@@ -119,14 +119,14 @@ FILES: dict[type[ValueError], Callable[[Path], object]] = {
 
 
 @pytest.mark.parametrize(("words", "function", "named"), OTHERS)
-def test_what_is_no_such_thing_is_refused(words: str, function: Callable[..., Any], named: dict[str, Any]) -> None:
+def test_what_is_no_such_thing_is_refused(words, function, named) -> None:
     kind = refused(words, function, **named)
     owned = (Scene, smokelift.Medium, Settings, Settings.preset, Sequence.open)
     assert kind in OWN_KINDS if function in owned or "closed" in named else kind is ValueError
 
 
 @pytest.mark.parametrize(("kind", "call"), FILES.items())
-def test_files_have_the_kind_of_what_they_hold(clip: Clip, tmp_path: Path, kind, call) -> None:
+def test_files_have_the_kind_of_what_they_hold(clip, tmp_path, kind, call) -> None:
     with pytest.raises(kind) as caught:
         call(tmp_path)
     assert type(caught.value) is kind
@@ -134,26 +134,26 @@ def test_files_have_the_kind_of_what_they_hold(clip: Clip, tmp_path: Path, kind,
 
 @pytest.mark.parametrize("opens", [Clip.open, Scene.load, SCENE.save, Sequence.open, ClipSource])
 @pytest.mark.parametrize("path", [None, 3, "", b"clip.mp4"])
-def test_a_path_that_is_none(opens: Callable[..., Any], path: Any) -> None:
+def test_a_path_that_is_none(opens, path) -> None:
     refused("must be the path of a", opens, path)
 
 
 @pytest.mark.parametrize("opens", [Clip.open, Scene.load, SCENE.save, Sequence.open, ClipSource])
 @pytest.mark.parametrize("address", ["http://example.com/clip.mp4", "file:///clip.mp4"])
-def test_an_address_is_no_path(opens: Callable[..., Any], address: str) -> None:
+def test_an_address_is_no_path(opens, address) -> None:
     refused("is an address; save the file on this computer", opens, address)
     refused(f'"{Path(address)}" is an address', opens, Path(address))
     assert ClipSource(nonsense("C:/clips/smoke.mp4")).path == Path("C:/clips/smoke.mp4"), "a drive is none"
 
 
 @pytest.mark.parametrize("folder", [".", "/", ""])
-def test_a_scene_is_not_saved_as_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, folder: str) -> None:
+def test_a_scene_is_not_saved_as_a_folder(tmp_path, monkeypatch, folder) -> None:
     monkeypatch.chdir(tmp_path)
     refused("is a folder; give the name of a file", SCENE.save, folder or tmp_path)
     assert list(tmp_path.iterdir()) == []
 
 
-def test_comments_of_a_scene_file_are_lines(tmp_path: Path) -> None:
+def test_comments_of_a_scene_file_are_lines(tmp_path) -> None:
     path = tmp_path / "scene.toml"
     refused('comments must be a list of lines, not "known"', SCENE.save, path, "known")
     SCENE.save(path, ["one\n[clip]"])
@@ -170,12 +170,12 @@ def test_comments_of_a_scene_file_are_lines(tmp_path: Path) -> None:
         ({"transfer": 2.2}, 'transfer must be "srgb" or "linear", not 2.2'),
     ],
 )
-def test_a_clip_read_in_no_way(clip: Clip, named: dict[str, Any], words: str) -> None:
+def test_a_clip_read_in_no_way(clip, named, words) -> None:
     refused(f"{clip.path}: {words}", Clip.open, clip.path, **named)
 
 
 @pytest.mark.parametrize("number", ["0", 1.0, None, 2, -1])
-def test_a_frame_that_is_none(clip: Clip, number: Any) -> None:
+def test_a_frame_that_is_none(clip, number) -> None:
     refused("there is no frame", clip.frame, number)
 
 
@@ -193,5 +193,5 @@ def test_one_of_something_is_no_plural() -> None:
 @pytest.mark.parametrize(
     ("value", "words"), [(True, "true"), ((1, 2), "[1, 2]"), ("a\nb", r'"a\nb"'), ("x" * 100, '"' + "x" * 56 + "...")]
 )
-def test_a_value_is_shown_as_in_a_scene_file(value: object, words: str) -> None:
+def test_a_value_is_shown_as_in_a_scene_file(value, words) -> None:
     assert shown(value) == words

@@ -244,11 +244,6 @@ def test_an_empty_picture_gives_zeros(small) -> None:
 # several views
 
 
-def moved(density: np.ndarray, voxels: int) -> np.ndarray:
-    """The same smoke so many voxels further away from the camera."""
-    return np.roll(density, voxels, axis=1)
-
-
 def observed(density: np.ndarray, scene: Scene, degrees: float) -> Observation:
     """What a camera sees that was carried around the box."""
     camera = orbit(scene.camera, scene.domain, degrees)
@@ -263,7 +258,7 @@ def mean_place(density: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("degrees", [40.0, 90.0])
 def test_a_second_view_tells_the_depth(plume, small, degrees) -> None:
     """Smoke off the middle of the box stands where it stood, which one picture cannot know; all pictures are fitted."""
-    truth = moved(plume.densities[1], 5)
+    truth = np.roll(plume.densities[1], 5, axis=1)  # further away from the camera
     target = render(truth, small)
     alone = reconstruct_density(target, small).density
     found = reconstruct_density(target, small, views=[observed(truth, small, degrees)])

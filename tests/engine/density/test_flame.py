@@ -30,19 +30,11 @@ SMOKE = 0.5 * ellipsoid((0, 0.1, 1.0), (0.25, 0.25, 0.5))
 FLAME = 3 * ellipsoid((0, 0.1, 0.5), (0.12, 0.12, 0.25))
 
 
-@pytest.fixture(scope="module")
-def found() -> np.ndarray:
-    """What the picture of `FLAME` in `SMOKE` gives."""
-    return flame_emission(emitted(FLAME, SMOKE, CAMERA, OPTICS), CAMERA, SMOKE, OPTICS)
-
-
-def test_it_shows_the_picture(found) -> None:
+def test_it_shows_the_picture_and_has_the_flames_size_and_place() -> None:
+    found = flame_emission(emitted(FLAME, SMOKE, CAMERA, OPTICS), CAMERA, SMOKE, OPTICS)
     light, shown = (emitted(flame, SMOKE, CAMERA, OPTICS) for flame in (FLAME, found))
     assert np.abs(shown - light).sum() < 0.012 * light.sum()
     assert found.min() >= 0
-
-
-def test_it_has_the_flames_size_and_place(found) -> None:
     (mean, width), (true_mean, true_width) = spread(found), spread(FLAME)
     np.testing.assert_allclose(mean, true_mean, atol=0.25 * DOMAIN.voxel_size)
     np.testing.assert_allclose(width, true_width, rtol=0.04, atol=0.4 * DOMAIN.voxel_size)

@@ -7,13 +7,10 @@ import pytest
 from scipy import ndimage
 
 import smokelift._core as _core
+from smokelift import Clip, Settings, Shot, prepare_shot
 from smokelift.density import DetailedDepth, GradientFit, RoundDepth, ViewSet
 from smokelift.density import levels as module
 from smokelift.density.levels import Level, any_of_two, with_neighbors
-from smokelift.footage.clip import Clip
-from smokelift.setup.prepare import prepare_shot
-from smokelift.setup.settings import Settings
-from smokelift.setup.shot import Shot
 
 SHAPE = (24, 24, 32)
 ODD = (5, 4, 7)
@@ -31,7 +28,7 @@ def shot(plume, tmp_path_factory) -> Iterator[Shot]:
 
 
 @pytest.fixture
-def large(monkeypatch: pytest.MonkeyPatch) -> None:
+def large(monkeypatch) -> None:
     """Let every grid of this size count as large, and one half as fine as small."""
     monkeypatch.setattr(module, "MIN_COARSENED_VOXELS", 2500)
 
@@ -44,7 +41,6 @@ def level(shot: Shot) -> Level:
 def test_a_coarser_grid_covers_the_smoke_once(shot, large) -> None:
     fine = level(shot)
     coarser = fine.coarser
-    assert coarser is not None
     assert coarser.coarser is None
     assert coarser.views.hull.shape == (12, 12, 16)
     assert not (fine.views.hull & ~coarser.views.hull.repeat(2, 0).repeat(2, 1).repeat(2, 2)).any()
@@ -57,7 +53,6 @@ def test_a_coarser_grid_covers_the_smoke_once(shot, large) -> None:
 def test_what_stays_there_stays_here(shot, large) -> None:
     fine = level(shot)
     coarser = fine.coarser
-    assert coarser is not None
     density = np.zeros(SHAPE, np.float32)
     density[fine.views.hull] = np.random.default_rng(0).random(np.count_nonzero(fine.views.hull), np.float32)
     np.testing.assert_allclose(coarser.changed(density, fine, lambda means: means), density, rtol=1e-5)
@@ -67,7 +62,7 @@ def test_what_stays_there_stays_here(shot, large) -> None:
 
 
 @pytest.mark.parametrize("deviation", [3.0, 4.0, 7.0])
-def test_a_wide_blur_on_coarser_grids_is_about_the_same(shot, deviation: float) -> None:
+def test_a_wide_blur_on_coarser_grids_is_about_the_same(shot, deviation) -> None:
     """Beside that of another density: at the hull's edge both fade."""
     fine = level(shot)
     hull = fine.views.hull
@@ -82,7 +77,7 @@ def test_a_wide_blur_on_coarser_grids_is_about_the_same(shot, deviation: float) 
     np.testing.assert_allclose(seen, wanted, rtol=0.03)
 
 
-def test_the_front_is_met_as_without_it(shot, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_front_is_met_as_without_it(shot, monkeypatch) -> None:
     def fitted() -> tuple[np.ndarray, float]:
         views = ViewSet.of(shot.observe(1), shot.optics, 1)
         found = GradientFit().fit(views, DetailedDepth(RoundDepth()).of_clip(shot).estimate(views), None)

@@ -66,7 +66,7 @@ def test_smoke_is_spread_about_its_axis(position, columns) -> None:
 
 
 @pytest.mark.parametrize("lean", [-0.4, 0.4])
-def test_smoke_stands_where_its_ray_meets_an_axis_that_leans(lean: float) -> None:
+def test_smoke_stands_where_its_ray_meets_an_axis_that_leans(lean) -> None:
     """A camera from above looks along rays that fall, so each meets the axis at another height than the middle."""
     camera = Camera.look_at((0, -6, 4), (0, 0, 1.5), fov_y_degrees=40, size=(90, 120))
     shape = Profile.of(pillar(camera, 38, 52), camera, SmokeAxis.by_height(HEIGHTS, lean * HEIGHTS)).shape
@@ -76,7 +76,7 @@ def test_smoke_stands_where_its_ray_meets_an_axis_that_leans(lean: float) -> Non
 
 
 @pytest.mark.parametrize("depth", [-0.3, 0.0, 0.3])
-def test_smoke_stands_where_its_ray_is_inside_the_domain(depth: float) -> None:
+def test_smoke_stands_where_its_ray_is_inside_the_domain(depth) -> None:
     """What shows beyond the domain's ends at the axis is nearer to the camera; elsewhere it is at the axis."""
     profile, shape, _ = Profile.of(pillar(LEVEL, 24, 36), LEVEL, SmokeAxis.upright(depth))
     fraction = profile.fraction_inside()[:, 30]
@@ -108,7 +108,7 @@ def test_columns_behind_one_another_make_it_deeper() -> None:
 
 
 @pytest.mark.parametrize("turn", [0, 30, 45, 90, 120])
-def test_smoke_is_as_deep_as_it_is_wide_across_its_own_axis(turn: float) -> None:
+def test_smoke_is_as_deep_as_it_is_wide_across_its_own_axis(turn) -> None:
     """A bar of smoke is as deep as it is thick, however it lies in the picture and however long it is."""
     camera = Camera("orthographic", LEVEL.matrix, (96, 96), 32.0, 32.0, 48.0, 48.0)
     rows, columns = np.indices((96, 96)) - 47.5

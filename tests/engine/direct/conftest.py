@@ -4,9 +4,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from smokelift import _core
+from smokelift import Sequence, _core
 from smokelift.direct.new_sequence import open_source
-from smokelift.output.sequence import Sequence
 from tests.engine.direct.rising import write_plume
 
 
@@ -19,7 +18,7 @@ def one_thread() -> Iterator[None]:
 
 
 @pytest.fixture(scope="module")
-def source(tmp_path_factory: pytest.TempPathFactory) -> Sequence:
+def source(tmp_path_factory) -> Sequence:
     """The plume as a sequence that is directed."""
     directory = tmp_path_factory.mktemp("source") / "smoke"
     write_plume(directory)

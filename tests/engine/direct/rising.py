@@ -6,15 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
+from smokelift import Domain, Sequence, Velocity
 from smokelift.direct.continuation import Continuation, continue_sequence
 from smokelift.direct.inflow import Inflow
 from smokelift.direct.simulation import Combustion, Physics, Simulation
 from smokelift.direct.state import SmokeState
 from smokelift.direct.surroundings import Ball, Surroundings
-from smokelift.output.sequence import Sequence
 from smokelift.output.writer import SequenceWriter
-from smokelift.scene import Domain
-from smokelift.transport import Velocity
 from tests.engine.output import small_sequence
 
 DOMAIN = Domain((-1, -1, 0), (1, 1, 3), (16, 16, 24))

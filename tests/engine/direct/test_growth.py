@@ -5,22 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from smokelift import PointLight, advect
 from smokelift.direct.continuation import DISSOLVED, Continuation
-from smokelift.direct.growth import (
-    BLOCK,
-    MARGIN_VOXELS,
-    Growth,
-    camera_and_lamp_places,
-    dissolve,
-    in_larger_box,
-    moves,
-)
+from smokelift.direct.growth import BLOCK, MARGIN_VOXELS, Growth, camera_and_lamp_places, dissolve, in_larger_box, moves
 from smokelift.direct.new_sequence import open_source
 from smokelift.direct.state import SmokeState
 from smokelift.direct.surroundings import Surroundings
 from smokelift.direct.turbulence import Turbulence
-from smokelift.scene import PointLight
-from smokelift.transport import advect
 from tests.engine.direct.rising import DOMAIN, DT, SCENE, along_x, at_rest, blob, run, run_twice
 
 ROOMY = Growth(DOMAIN, ("z-",), 20 * DOMAIN.resolution[0] * DOMAIN.resolution[1] * DOMAIN.resolution[2])

@@ -50,11 +50,8 @@ def test_the_inlet_of_a_plume_is_found():
         np.testing.assert_array_equal(find_inflow(scaled, DT).voxels, found)
 
 
-def test_smoke_that_only_moves_has_no_inlet():
+def test_what_only_moves_or_enters_at_changing_places_is_no_inlet() -> None:
     assert not find_inflow(course(free(), at_rest(blob()), 8), DT).voxels.any()
-
-
-def test_what_enters_at_changing_places_is_no_inlet():
     rest = at_rest(blob())
     grown = [rest.density]
     for place in (-0.5,) * 4 + (0.5,) * 4:

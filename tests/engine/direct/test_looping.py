@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
+from smokelift import Sequence, Velocity
 from smokelift.direct.looping import loop_sequence, mix_by_edges, seam
 from smokelift.direct.state import SmokeState
-from smokelift.output.sequence import Sequence
 from smokelift.scene import SIDES, Domain
-from smokelift.transport import Velocity
 from tests.engine.direct import rising
 from tests.engine.direct.rising import DOMAIN, DT, blob
 

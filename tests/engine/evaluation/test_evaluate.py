@@ -9,12 +9,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from smokelift import Velocity, render
 from smokelift.output.archive import VELOCITY
 from smokelift.output.images import write_image
 from smokelift.output.writer import SequenceWriter
-from smokelift.render import render
 from smokelift.scene import Background, Domain, Scene, orbit
-from smokelift.transport import Velocity
 from tests.engine.app.command_line import command, refused
 
 RISE = 1.5

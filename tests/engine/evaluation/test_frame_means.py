@@ -1,5 +1,6 @@
 """Figures gathered over frames: what is perfect, what is wrong in one way only, and other grids."""
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -39,6 +40,14 @@ def truth() -> Truth:
     )
 
 
+def scored(truth: Truth, change=lambda _, *moment: moment, frames: Iterable[int] = range(4)) -> dict[str, float]:
+    """Figures of the truth's own frames, whose density and velocity are changed."""
+    score = VolumeMeans(truth)
+    for frame in frames:
+        score.add(frame, *change(frame, truth.density(frame), truth.velocity(max(frame - 1, 0)).centres()))
+    return score.figures()
+
+
 def picture(shift: int = 0, size: tuple[int, int] = (96, 64)) -> np.ndarray:
     rows, columns = np.indices(size, np.float32)
     ball = np.exp(-(((rows - 50) / 8) ** 2) - ((columns - 30 - shift) / 6) ** 2)
@@ -54,10 +63,7 @@ def test_a_shifted_picture_is_another_one() -> None:
 
 
 def test_the_truth_itself_is_perfect(truth) -> None:
-    score = VolumeMeans(truth)
-    for frame in range(4):
-        score.add(frame, truth.density(frame), truth.velocity(max(frame - 1, 0)).centres())
-    figures = score.figures()
+    figures = scored(truth)
     assert figures["density_error"] == figures["height_mass_error"] == figures["velocity_error"] == 0
     assert figures["velocity_error_around"] == 0
     assert figures["mass_ratio"] == pytest.approx(1)
@@ -67,42 +73,31 @@ def test_the_truth_itself_is_perfect(truth) -> None:
 
 
 def test_each_mistake_shows_where_it_belongs(truth) -> None:
-    half, deep, slow = VolumeMeans(truth), VolumeMeans(truth), VolumeMeans(truth)
-    still = np.zeros((*SHAPE, 3), np.float32)
-    for frame in range(4):
-        density, velocity = truth.density(frame), truth.velocity(max(frame - 1, 0)).centres()
-        half.add(frame, 0.5 * density)
-        deep.add(frame, np.roll(density, 1, 1), velocity)
-        slow.add(frame, density, velocity * (0.5 if frame < 3 else 1) if frame != 1 else still)
-    assert half.figures()["mass_ratio"] == pytest.approx(0.5)
-    assert half.figures()["height_mass_error"] == pytest.approx(0.5)
-    assert "velocity_error" not in half.figures()
-    assert deep.figures()["density_error"] > 0.2
-    assert deep.figures()["height_mass_error"] == pytest.approx(0, abs=1e-6)
-    assert deep.figures()["warp_error"] == pytest.approx(deep.figures()["warp_error_truth"], abs=1e-3)
-    assert slow.figures()["velocity_error"] == pytest.approx((1 + 0.5 + 0) / 3)
-    assert slow.figures()["velocity_cosine"] == pytest.approx(2 / 3)
-    assert slow.figures()["warp_error"] > 0.1
+    half = scored(truth, lambda _, density, velocity: (0.5 * density,))
+    deep = scored(truth, lambda _, density, velocity: (np.roll(density, 1, 1), velocity))
+    slow = scored(truth, lambda frame, density, velocity: (density, (0.5, 0, 0.5, 1)[frame] * velocity))
+    assert half["mass_ratio"] == half["height_mass_error"] == pytest.approx(0.5)
+    assert "velocity_error" not in half
+    assert deep["density_error"] > 0.2
+    assert deep["height_mass_error"] == pytest.approx(0, abs=1e-6)
+    assert deep["warp_error"] == pytest.approx(deep["warp_error_truth"], abs=1e-3)
+    assert slow["velocity_error"] == pytest.approx((1 + 0.5 + 0) / 3)
+    assert slow["velocity_cosine"] == pytest.approx(2 / 3)
+    assert slow["warp_error"] > 0.1
 
 
 def test_where_smoke_is_put_in_motion_is_not_scored(truth) -> None:
     inlet = np.zeros(SHAPE, bool)
     inlet[6:10, 6:10, 6:9] = True
     fed = replace(truth, inflow_packed=np.stack([np.packbits(inlet)] * 4))
-    right, wrong = VolumeMeans(fed), VolumeMeans(fed)
-    for frame in range(3):
-        density, velocity = truth.density(frame), truth.velocity(max(frame - 1, 0)).centres()
-        right.add(frame, density, velocity)
-        wrong.add(frame, density, np.where(inlet[..., None], -velocity, velocity))
+    right = scored(fed, frames=range(3))
+    wrong = scored(fed, lambda _, rho, u: (rho, np.where(inlet[..., None], -u, u)), range(3))
     for name in ("velocity_error", "velocity_error_around", "warp_error"):
-        assert wrong.figures()[name] == right.figures()[name]
+        assert wrong[name] == right[name]
 
 
 def test_a_velocity_after_a_gap_is_not_scored(truth) -> None:
-    score = VolumeMeans(truth)
-    score.add(0, truth.density(0), np.zeros((*SHAPE, 3), np.float32))
-    score.add(2, truth.density(2), np.zeros((*SHAPE, 3), np.float32))
-    assert "velocity_error" not in score.figures()
+    assert "velocity_error" not in scored(truth, lambda _, density, velocity: (density, 0 * velocity), (0, 2))
 
 
 def test_values_are_those_of_an_8_bit_picture() -> None:

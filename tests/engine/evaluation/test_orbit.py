@@ -6,19 +6,14 @@ import numpy as np
 import pytest
 
 from smokelift.evaluation.orbit import Orbit, gray
-from smokelift.scene import Background, CompleteScene, DirectionalLight, Medium, PointLight, completed
-
-
-@pytest.fixture(scope="module")
-def scene(plume) -> CompleteScene:
-    return completed(plume.scene)
+from smokelift.scene import Background, DirectionalLight, Medium, PointLight
 
 
 @pytest.mark.parametrize(
     "light", [DirectionalLight((1, 0.2, -0.5), (5, 5, 5)), PointLight((-1.5, -0.3, 1), (8, 8, 8))], ids=["sun", "lamp"]
 )
-def test_smoke_that_turns_under_turning_lights_looks_the_same(plume, scene, light):
-    lit = replace(scene, lights=(light,))
+def test_smoke_that_turns_under_turning_lights_looks_the_same(plume, complete, light):
+    lit = replace(complete, lights=(light,))
     density = plume.densities[2]
     turned = np.ascontiguousarray(np.rot90(density, 1, (0, 1)))  # by 90 degrees about the vertical
     front = Orbit(lit).picture(density, 0)
@@ -28,18 +23,18 @@ def test_smoke_that_turns_under_turning_lights_looks_the_same(plume, scene, ligh
     assert min(np.abs(picture - front).max() for picture in fixed) > 0.1 * front.max()
 
 
-def test_the_background_does_not_count_and_smoke_is_before_black(plume, scene):
+def test_the_background_does_not_count_and_smoke_is_before_black(plume, complete):
     density = plume.densities[2]
-    bright = replace(scene, background=Background(color=(0.5, 0.5, 0.5)))
+    bright = replace(complete, background=Background(color=(0.5, 0.5, 0.5)))
     picture = Orbit(bright).picture(density, 45)
-    np.testing.assert_array_equal(picture, Orbit(scene).picture(density, 45))
+    np.testing.assert_array_equal(picture, Orbit(complete).picture(density, 45))
     assert picture.max() > 0.2 and picture[:3].max() == 0
 
 
-def test_smoke_that_only_absorbs_is_seen_by_its_shadow(plume, scene):
+def test_smoke_that_only_absorbs_is_seen_by_its_shadow(plume, complete):
     density = plume.densities[2]
-    lit = Orbit(scene).picture(density, 30)
-    for dark in (replace(scene, lights=()), replace(scene, medium=Medium(8.0, albedo=0.0))):
+    lit = Orbit(complete).picture(density, 30)
+    for dark in (replace(complete, lights=()), replace(complete, medium=Medium(8.0, albedo=0.0))):
         shadow = Orbit(dark).picture(density, 30)
         assert shadow.max() > 0.2 and shadow[:3].max() == pytest.approx(0, abs=1e-3)
         assert np.corrcoef((shadow > 0.05).ravel(), (lit > 0.05).ravel())[0, 1] > 0.8

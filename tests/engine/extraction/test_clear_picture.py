@@ -1,7 +1,5 @@
 """The clean plate that is found from the clip alone."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -19,7 +17,7 @@ from tests.engine.films import HEIGHT, WIDTH, codes_apart, film, plate_of, puff,
     [(0.2, 0.5, 0.6), (0.6, 0.9, 0.02), (0.2, 0.9, 0.25)],
     ids=["brightening", "darkening", "both"],
 )
-def test_plate_and_matte(tmp_path: Path, low: float, high: float, color: float) -> None:
+def test_plate_and_matte(tmp_path, low, high, color) -> None:
     truth = wall(low, high)
     clip = film(tmp_path, truth, puff, color)
     plate = plate_of(clip)
@@ -41,9 +39,8 @@ def test_plate_and_matte(tmp_path: Path, low: float, high: float, color: float) 
         assert np.median(result.deviation[puff(n) == 0.0]) < 1.5
 
 
-def test_noise_is_measured(tmp_path: Path) -> None:
+def test_noise_is_measured(tmp_path) -> None:
     for name, codes in (("quiet", 0.0), ("noisy", 4.0)):
-        (tmp_path / name).mkdir()
         flat = np.full((HEIGHT, WIDTH, 3), 0.2, np.float32)
         plate = plate_of(film(tmp_path / name, flat, puff, 0.8, codes))
         assert plate.noise.total.shape == (3,)
@@ -51,7 +48,7 @@ def test_noise_is_measured(tmp_path: Path) -> None:
         np.testing.assert_allclose(plate.noise.lasting, 1 / 255, rtol=0.3)
 
 
-def test_pixels_that_are_never_clear_are_filled_and_marked(tmp_path: Path) -> None:
+def test_pixels_that_are_never_clear_are_filled_and_marked(tmp_path) -> None:
     truth = np.linspace(0.1, 0.3, WIDTH, dtype=np.float32)[None, :, None].repeat(HEIGHT, 0).repeat(3, 2)
     rows, columns = np.mgrid[:HEIGHT, :WIDTH]
     jet = (np.abs(columns - WIDTH / 2) < 5) & (rows > 30)
@@ -71,9 +68,7 @@ def test_pixels_that_are_never_clear_are_filled_and_marked(tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize(("color", "edge"), [(0.9, 0.1), (0.02, 0.9)])
-def test_smoke_that_never_leaves_tells_itself_which_way_it_changes_the_picture(
-    tmp_path: Path, color: float, edge: float
-) -> None:
+def test_smoke_that_never_leaves_tells_itself_which_way_it_changes_the_picture(tmp_path, color, edge) -> None:
     truth = np.linspace(0.2, 0.3, WIDTH, dtype=np.float32)[None, :, None].repeat(HEIGHT, 0).repeat(3, 2)
     rows, columns = np.mgrid[:HEIGHT, :WIDTH]
     column = np.abs(columns - WIDTH / 2) < 14
@@ -90,36 +85,26 @@ def test_smoke_that_never_leaves_tells_itself_which_way_it_changes_the_picture(
     assert np.median(codes_apart(plate.image, truth)[inner]) < 15
 
 
-def test_a_plume_that_hardly_changes_is_no_part_of_a_smooth_wall(tmp_path: Path) -> None:
-    """It is of another hue, but hardly brighter."""
-    tone = np.linspace(0.8, 1.2, HEIGHT)[:, None, None]
-    truth = (tone * np.full((1, WIDTH, 3), (0.4, 0.3, 0.2))).astype(np.float32)
-    plume = np.exp(-(((np.arange(WIDTH) - WIDTH / 2) / 8) ** 2)) * np.ones((HEIGHT, 1))
+PLUME = np.exp(-(((np.arange(WIDTH) - WIDTH / 2) / 8) ** 2)) * np.ones((HEIGHT, 1))
+"""Opacity of a column that never leaves the middle."""
+
+
+@pytest.mark.parametrize(("hue", "thickest", "even"), [((0.4, 0.3, 0.2), 0.6, False), ((0.45, 0.3, 0.18), 0.9, True)])
+def test_a_plume_that_never_leaves_a_smooth_wall_shows_by_its_hue(tmp_path, hue, thickest, even) -> None:
+    """It hardly changes and is hardly brighter than the wall, or changes the mean of the channels by nothing."""
+    tone = np.linspace(0.8, 1.2, HEIGHT, dtype=np.float32)[:, None, None]
+    truth = np.repeat(tone * np.float32(hue), WIDTH, 1)
+    color = srgb_to_linear(linear_to_srgb(truth).mean(-1, keepdims=True)) if even else 0.42
 
     def opacity(n: int) -> np.ndarray:
-        return plume * np.random.default_rng(n).uniform(0.3, 0.6, (HEIGHT // 8, 1)).repeat(8, 0)
+        return PLUME * np.random.default_rng(n).uniform(0.3, thickest, (HEIGHT // 8, 1)).repeat(8, 0)
 
-    plate = plate_of(film(tmp_path, truth, opacity, 0.42, 0.5))
-    assert plate.confidence[plume > 0.7].mean() < 0.3
-    assert plate.confidence[plume < 0.01].min() == 1.0
-
-
-def test_smoke_as_bright_as_a_wall_shows_by_its_hue(tmp_path: Path) -> None:
-    """It changes the mean of the channels by nothing, and never leaves the middle."""
-    beige = np.linspace(0.8, 1.2, HEIGHT, dtype=np.float32)[:, None, None] * np.float32((0.45, 0.3, 0.18))
-    truth = np.repeat(beige, WIDTH, 1)
-    gray = srgb_to_linear(linear_to_srgb(truth).mean(-1, keepdims=True))
-    plume = np.exp(-(((np.arange(WIDTH) - WIDTH / 2) / 8) ** 2)) * np.ones((HEIGHT, 1))
-
-    def opacity(n: int) -> np.ndarray:
-        return plume * np.random.default_rng(n).uniform(0.3, 0.9, (HEIGHT // 8, 1)).repeat(8, 0)
-
-    plate = plate_of(film(tmp_path, truth, opacity, gray, 0.5))
-    assert plate.confidence[plume > 0.7].mean() < 0.3
-    assert plate.confidence[plume < 0.01].min() == 1.0
+    plate = plate_of(film(tmp_path, truth, opacity, color, 0.5))
+    assert plate.confidence[PLUME > 0.7].mean() < 0.3
+    assert plate.confidence[PLUME < 0.01].min() == 1.0
 
 
-def test_a_wall_that_is_hardly_shaded_tells_its_smoke_by_hue(tmp_path: Path) -> None:
+def test_a_wall_that_is_hardly_shaded_tells_its_smoke_by_hue(tmp_path) -> None:
     """Its pixels differ by fewer codes than an even color's may."""
     tone = np.linspace(0.88, 1.12, WIDTH, dtype=np.float32)[:, None]
     truth = np.broadcast_to(tone * np.float32((0.18, 0.32, 0.16)), (HEIGHT, WIDTH, 3))
@@ -128,20 +113,15 @@ def test_a_wall_that_is_hardly_shaded_tells_its_smoke_by_hue(tmp_path: Path) -> 
     assert estimate.source == pytest.approx(np.full(3, 0.4), rel=0.25)
 
 
-def test_the_last_smoke_is_no_part_of_a_smooth_wall(tmp_path: Path) -> None:
+def test_the_last_smoke_is_no_part_of_a_smooth_wall(tmp_path) -> None:
     """Half of the frames show its haze alone, as steady as the wall."""
     tone = np.linspace(0.15, 0.4, HEIGHT, dtype=np.float32)[:, None, None]
     truth = np.broadcast_to(tone, (HEIGHT, WIDTH, 3))
-    plume = np.exp(-(((np.arange(WIDTH) - WIDTH / 2) / 8) ** 2)) * np.ones((HEIGHT, 1))
-
-    def opacity(n: int) -> np.ndarray:
-        return plume * (0.04 if n % 2 else 0.6)
-
-    plate = plate_of(film(tmp_path, truth, opacity, 0.8, 0.5))
-    assert codes_apart(plate.image, truth)[plume > 0.7].mean() < 5
+    plate = plate_of(film(tmp_path, truth, lambda n: PLUME * (0.04 if n % 2 else 0.6), 0.8, 0.5))
+    assert codes_apart(plate.image, truth)[PLUME > 0.7].mean() < 5
 
 
-def test_haze_that_stands_beside_smoke_is_no_part_of_a_smooth_wall(tmp_path: Path) -> None:
+def test_haze_that_stands_beside_smoke_is_no_part_of_a_smooth_wall(tmp_path) -> None:
     """It never changes, and is up to three codes brighter than the wall, which goes on beside it."""
     away = np.abs(np.mgrid[:HEIGHT, :WIDTH][1] - WIDTH / 2)
     haze = 0.02 * np.exp(-0.5 * ((away - 5) / 3) ** 2)
@@ -153,7 +133,7 @@ def test_haze_that_stands_beside_smoke_is_no_part_of_a_smooth_wall(tmp_path: Pat
     assert codes_apart(found.image, flat)[beside].mean() < 1
 
 
-def test_what_hardly_changes_is_background_however_unlike_its_surroundings(tmp_path: Path) -> None:
+def test_what_hardly_changes_is_background_however_unlike_its_surroundings(tmp_path) -> None:
     jacket = np.s_[40:, :12]
     truth = wall(0.6, 0.9)
     truth[jacket] = 0.01

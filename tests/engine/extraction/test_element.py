@@ -1,6 +1,5 @@
 """Smoke without its plate: a blob whose transmittance and light are known, before plates of all kinds."""
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -43,7 +42,8 @@ def sky() -> Picture:
 
 
 TRANSMITTANCE, RADIANCE = blob()
-PLATES = {"wall": wall(), "sky": sky()}
+WALL = wall()
+PLATES = {"wall": WALL, "sky": sky()}
 
 
 def plate_of(image: Picture, confidence: float = 1.0) -> Plate:
@@ -84,12 +84,22 @@ def fields_of(element: Element) -> tuple[Picture, ...]:
     return element.radiance, element.transmittance, element.deviation, element.weight
 
 
+PICTURE = filmed(clear_picture(WALL))
+"""The blob before the wall."""
+
+
+@pytest.fixture(scope="module")
+def before_wall() -> Element:
+    """What is found in `PICTURE`."""
+    return extracted(PICTURE, plate_of(WALL))
+
+
 # what is found
 
 
 @pytest.mark.parametrize("plate", PLATES.values(), ids=PLATES.keys())
 @pytest.mark.parametrize("size", [(192, 144), (128, 96), (62, 46)], ids=str)
-def test_a_blob_is_found_before_a_plate(plate: Picture, size: tuple[int, int]) -> None:
+def test_a_blob_is_found_before_a_plate(plate, size) -> None:
     """By the plate's detail, or by its color, to .015 in T and in what smoke sends; over its plate it is seen."""
     picture = filmed(clear_picture(plate))
     found = extracted(picture, plate_of(plate), size=size)
@@ -108,44 +118,39 @@ def test_a_blob_is_found_before_a_plate(plate: Picture, size: tuple[int, int]) -
 
 def test_smoke_is_found_whatever_its_light() -> None:
     """A source of twice or half the smoke's radiance changes T little: detail tells it, not brightness."""
-    picture = filmed(clear_picture(PLATES["wall"]))
     for wrong in (0.5, 2.0):
-        found = extracted(picture, plate_of(PLATES["wall"]), SOURCE * np.float32(wrong))
+        found = extracted(PICTURE, plate_of(WALL), SOURCE * np.float32(wrong))
         assert rms(found.transmittance - TRANSMITTANCE) < 0.04
 
 
-def test_the_plate_leaves_no_imprint() -> None:
-    plate = PLATES["wall"]
-    found = extracted(filmed(clear_picture(plate)), plate_of(plate))
+def test_the_plate_leaves_no_imprint(before_wall) -> None:
     smoky = TRANSMITTANCE < 0.8
-    behind = detail(plate.mean(-1))[smoky]
+    behind = detail(WALL.mean(-1))[smoky]
     sent = (1 - TRANSMITTANCE)[..., None] * RADIANCE
-    for error in (found.transmittance - TRANSMITTANCE, (found.radiance - sent).mean(-1)):
+    for error in (before_wall.transmittance - TRANSMITTANCE, (before_wall.radiance - sent).mean(-1)):
         assert abs(np.corrcoef(detail(error)[smoky], behind)[0, 1]) < 0.15
 
 
 def test_clear_air_sends_nothing() -> None:
-    plate = PLATES["wall"]
-    found = extracted(filmed(plate), plate_of(plate))
+    found = extracted(filmed(WALL), plate_of(WALL))
     assert found.transmittance.mean() > 0.98
     assert np.abs(found.radiance.mean((0, 1))).max() < 0.01
-    assert rms(detail(found.radiance)) < 0.3 * rms(detail(filmed(plate) - plate))
+    assert rms(detail(found.radiance)) < 0.3 * rms(detail(filmed(WALL) - WALL))
 
 
-def test_before_black_the_picture_is_what_smoke_sends() -> None:
+def test_before_black_the_picture_is_what_smoke_sends(before_wall) -> None:
     """The middle of the wall is black: T is not seen there, and its deviation says so."""
     plate = wall()
     plate[:, 48:144] = 0
     picture = filmed(clear_picture(plate))
     found = extracted(picture, plate_of(plate))
-    seen = extracted(filmed(clear_picture(wall())), plate_of(wall()))
     dark = np.zeros((ROWS, COLUMNS), np.bool_)
     dark[:, 56:136] = True
     fits = dark & (found.weight == 1)
     assert fits.sum() > 0.95 * dark.sum()
     np.testing.assert_allclose(found.radiance[fits], picture[fits], atol=4e-4)  # a code of black
     smoky = dark & (TRANSMITTANCE < 0.6)
-    assert np.median(found.deviation[smoky]) > 1.5 * np.median(seen.deviation[smoky])
+    assert np.median(found.deviation[smoky]) > 1.5 * np.median(before_wall.deviation[smoky])
     assert rms((found.transmittance - TRANSMITTANCE)[smoky]) < 1.5 * rms(found.deviation[smoky])
 
 
@@ -164,18 +169,16 @@ def test_detail_that_a_codec_takes_from_thin_smoke_is_no_opacity() -> None:
 
 
 @pytest.mark.parametrize("color", [(0.9, 0.05, 0.02), (0.02, 0.6, 0.05)], ids=["red", "green"])
-def test_a_hand_before_smoke_is_an_outlier(color: tuple[float, float, float]) -> None:
-    plate = PLATES["wall"]
-    clean = filmed(clear_picture(plate))
-    covered = clean.copy()
+def test_a_hand_before_smoke_is_an_outlier(before_wall, color) -> None:
+    covered = PICTURE.copy()
     covered[BOX] = color
-    before, after = extracted(clean, plate_of(plate)), extracted(covered, plate_of(plate))
+    after = extracted(covered, plate_of(WALL))
     hidden, around = np.zeros((2, ROWS, COLUMNS), np.bool_)
     hidden[BOX] = True
     around[58:90, 100:134] = True
     assert after.weight[hidden].mean() < 0.1
     assert after.weight[~hidden].mean() > 0.98
-    change = after.transmittance - before.transmittance
+    change = after.transmittance - before_wall.transmittance
     assert rms(change[around & ~hidden]) < 0.09
     assert rms(change[~around]) < 0.005
     # it is no smoke: its own radiance is not sent by the element
@@ -184,35 +187,29 @@ def test_a_hand_before_smoke_is_an_outlier(color: tuple[float, float, float]) ->
 
 def test_a_wrong_plate_counts_less_where_it_is_said_to_be_wrong() -> None:
     """The wall's brightness is wrong by 20 % in patches, its colors are right."""
-    plate = PLATES["wall"]
     patches = blurred(np.random.default_rng(5).standard_normal((ROWS, COLUMNS, 1)).astype(np.float32), 12.0)
-    wrong = np.maximum(plate * (1 + 0.2 * patches / patches.std()), 0.01).astype(np.float32)
-    error = (wrong - plate).reshape(-1, 3)
+    wrong = np.maximum(WALL * (1 + 0.2 * patches / patches.std()), 0.01).astype(np.float32)
+    error = (wrong - WALL).reshape(-1, 3)
     covariance = error.T @ error / np.float32(len(error))
-    picture = filmed(clear_picture(plate))
-    trusted = extracted(picture, plate_of(wrong))
-    doubted = extracted(picture, replace(plate_of(wrong, 0.0), errors=covariance))
-    channels_apart = replace(plate_of(wrong, 0.0), errors=np.diag(np.diag(covariance)))
-    diagonal = extracted(picture, channels_apart)
+    trusted = extracted(PICTURE, plate_of(wrong))
+    doubted, diagonal = (
+        extracted(PICTURE, replace(plate_of(wrong, 0.0), errors=errors))
+        for errors in (covariance, np.diag(np.diag(covariance)))
+    )
     missed = [rms(found.transmittance - TRANSMITTANCE) for found in (trusted, doubted, diagonal)]
     assert np.median(doubted.deviation) > 1.2 * np.median(trusted.deviation)
     assert doubted.weight.mean() > trusted.weight.mean() + 0.05
     assert missed[1] < 0.95 * min(missed[0], missed[2])  # what the colors tell still counts
 
 
-def test_confidence_says_where_errors_count() -> None:
-    plate = PLATES["wall"]
-    picture = filmed(clear_picture(plate))
-    errors = np.eye(3, dtype=np.float32) * np.float32(0.1**2)
-    known = extracted(picture, plate_of(plate))
-    np.testing.assert_array_equal(
-        extracted(picture, replace(plate_of(plate), errors=errors)).transmittance, known.transmittance
-    )
+def test_confidence_says_where_errors_count(before_wall) -> None:
+    plate = replace(plate_of(WALL), errors=np.eye(3, dtype=np.float32) * np.float32(0.1**2))
+    np.testing.assert_array_equal(extracted(PICTURE, plate).transmittance, before_wall.transmittance)
     confidence = np.ones((ROWS, COLUMNS), np.float32)
     confidence[:, 96:] = 0
-    partly = extracted(picture, replace(plate_of(plate), errors=errors, confidence=confidence))
+    partly = extracted(PICTURE, replace(plate, confidence=confidence))
     clear = TRANSMITTANCE > 0.8
-    raised = partly.deviation / known.deviation
+    raised = partly.deviation / before_wall.deviation
     left, right = clear & (np.arange(COLUMNS) < 72), clear & (np.arange(COLUMNS) >= 120)
     assert raised[left].max() < 1.1
     assert raised[right].min() > 1.3
@@ -223,36 +220,31 @@ def test_confidence_says_where_errors_count() -> None:
 
 @settings(max_examples=12, deadline=None, derandomize=True)
 @given(st.floats(-3, 3))
-def test_exposure_scales_the_radiance_alone(stops: float) -> None:
+def test_exposure_scales_the_radiance_alone(stops) -> None:
     """Of a picture without noise; the noise is even in code values, not in light."""
     gain = np.float32(2.0**stops)
-    plate, size = PLATES["wall"], (48, 36)
-    silent = Plate(plate, np.ones((ROWS, COLUMNS), np.float32), lasting_noise(0.0))
-    picture = clear_picture(plate)
+    size, picture = (48, 36), clear_picture(WALL)
+    silent = Plate(WALL, np.ones((ROWS, COLUMNS), np.float32), lasting_noise(0.0))
     one = extracted(picture, silent, size=size)
-    other = extracted(picture * gain, replace(silent, image=plate * gain), SOURCE * gain, size)
+    other = extracted(picture * gain, replace(silent, image=WALL * gain), SOURCE * gain, size)
     assert np.abs(other.transmittance - one.transmittance).max() < 2e-3
     np.testing.assert_allclose(other.radiance, gain * one.radiance, atol=1e-3 * gain)
 
 
 @pytest.mark.parametrize("flip", [np.fliplr, np.flipud, lambda picture: np.swapaxes(picture, 0, 1)])
-def test_a_flipped_picture_has_a_flipped_element(flip: Callable[[Picture], Picture]) -> None:
+def test_a_flipped_picture_has_a_flipped_element(before_wall, flip) -> None:
     """The pyramid has its odd cells at the other end, and the rounds end before all digits are found."""
-    plate = PLATES["wall"]
-    picture = filmed(clear_picture(plate))
-    straight = extracted(picture, plate_of(plate))
-    flipped = extracted(np.ascontiguousarray(flip(picture)), plate_of(np.ascontiguousarray(flip(plate))))
-    assert rms(flipped.transmittance - flip(straight.transmittance)) < 1e-3
-    assert rms(flipped.radiance - flip(straight.radiance)) < 1e-3
-    assert rms(flipped.deviation / flip(straight.deviation) - 1) < 0.02
+    flipped = extracted(np.ascontiguousarray(flip(PICTURE)), plate_of(np.ascontiguousarray(flip(WALL))))
+    assert rms(flipped.transmittance - flip(before_wall.transmittance)) < 1e-3
+    assert rms(flipped.radiance - flip(before_wall.radiance)) < 1e-3
+    assert rms(flipped.deviation / flip(before_wall.deviation) - 1) < 0.02
 
 
-def test_the_result_is_that_of_any_number_of_threads(set_threads: Callable[[int], None]) -> None:
-    picture = filmed(clear_picture(PLATES["wall"]))
+def test_the_result_is_that_of_any_number_of_threads(set_threads) -> None:
     found = []
     for count in (1, 2, 1):
         set_threads(count)
-        found.append(extracted(picture, plate_of(PLATES["wall"])))
+        found.append(extracted(PICTURE, plate_of(WALL)))
     for other in found[1:]:
         for one, same in zip(fields_of(found[0]), fields_of(other), strict=True):
             np.testing.assert_array_equal(one, same)
@@ -262,11 +254,11 @@ def test_the_result_is_that_of_any_number_of_threads(set_threads: Callable[[int]
 
 
 @pytest.mark.parametrize("shape", [(1, 1), (1, 9), (9, 1), (2, 1), (2, 2), (7, 5), (31, 17), (3, 192)], ids=str)
-def test_any_size_is_taken(shape: tuple[int, int]) -> None:
+def test_any_size_is_taken(shape) -> None:
     rows, columns = shape
     part = slice(48, 48 + rows), slice(0 if columns == COLUMNS else 80, columns if columns == COLUMNS else 80 + columns)
-    plate = PLATES["wall"][part]
-    picture = clear_picture(PLATES["wall"])[part]
+    plate = WALL[part]
+    picture = clear_picture(WALL)[part]
     for size in {(columns, rows), (max(1, columns // 2), max(1, rows // 2)), (1, 1)}:
         found = extracted(picture, plate_of(plate), size=size)
         assert found.radiance.shape == (size[1], size[0], 3)
@@ -277,7 +269,7 @@ def test_any_size_is_taken(shape: tuple[int, int]) -> None:
 
 def test_the_longest_pictures_have_coarser_cells() -> None:
     """Cells end at 192 along a side, the element does not; what is finer is still the picture's."""
-    wide = np.tile(PLATES["wall"][:8], (1, 3, 1))
+    wide = np.tile(WALL[:8], (1, 3, 1))
     clear = np.tile(TRANSMITTANCE[64:72], (1, 3))
     picture = (1 - clear)[..., None] * SOURCE + clear[..., None] * wide
     found = extracted(picture, plate_of(wide))
@@ -287,7 +279,7 @@ def test_the_longest_pictures_have_coarser_cells() -> None:
 
 @pytest.mark.parametrize("picture", [0.0, 0.3, 1.0, 1e4, 1e8])
 @pytest.mark.parametrize("plate", [0.0, 0.3, 1e8])
-def test_no_brightness_makes_nan(picture: float, plate: float) -> None:
+def test_no_brightness_makes_nan(picture, plate) -> None:
     for source in (0.01, 1e4):
         found = extracted(
             np.full((12, 18, 3), picture, np.float32),

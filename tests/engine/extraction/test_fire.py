@@ -1,7 +1,5 @@
 """Fire is distinguished from colored smoke, and smoke is continued over it."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -47,7 +45,7 @@ def test_a_flame_is_fire_whatever_the_smoke_is(what) -> None:
 @pytest.mark.parametrize(
     ("bright", "burns", "may_burn"), [(0, False, False), (18, False, True), (30, True, True)], ids=str
 )
-def test_fire_of_which_little_is_bright_may_be_fire(bright: int, burns: bool, may_burn: bool) -> None:
+def test_fire_of_which_little_is_bright_may_be_fire(bright, burns, may_burn) -> None:
     """A hundred pixels of fire, some of them as bright as white, in smoke that is as bright as most of them."""
     flames = np.tile(np.float32((0.75, 0.3, 0.06)), (100, 1))
     flames[:bright] *= 1.25
@@ -81,7 +79,7 @@ def test_what_is_added_to_the_background_counts() -> None:
     assert fire_share(seen, np.concatenate([sky, 0.9 * flames])) == 0
 
 
-def test_smoke_is_continued_over_fire_and_stays_elsewhere(tmp_path: Path) -> None:
+def test_smoke_is_continued_over_fire_and_stays_elsewhere(tmp_path) -> None:
     clip = clip_of(tmp_path, map(picture, range(4)))
     dark = without_fire(clip, known_plate(np.zeros(3), clip)[0])
     seen, before = dark.frame(2), clip.frame(2)
@@ -91,7 +89,7 @@ def test_smoke_is_continued_over_fire_and_stays_elsewhere(tmp_path: Path) -> Non
     np.testing.assert_array_equal(seen[:20], before[:20])
 
 
-def test_the_light_of_fire_is_what_it_adds_to_the_smoke(tmp_path: Path) -> None:
+def test_the_light_of_fire_is_what_it_adds_to_the_smoke(tmp_path) -> None:
     """Where it is and nowhere else, in its own color; the smoke that is continued is thinner than that in the fire."""
     with clip_of(tmp_path, map(picture, range(3)), ".exr") as clip:
         light = firelight(clip, without_fire(clip, known_plate(np.zeros(3), clip)[0]))
@@ -101,7 +99,7 @@ def test_the_light_of_fire_is_what_it_adds_to_the_smoke(tmp_path: Path) -> None:
         assert not added[:20].any() and added.min() == 0
 
 
-def test_fire_is_found_in_frames_of_any_exposure(tmp_path: Path) -> None:
+def test_fire_is_found_in_frames_of_any_exposure(tmp_path) -> None:
     """In a frame at half the exposure fire adds too little light, before it is exposed as the others are."""
     behind = 0.1 + 0.1 * np.random.default_rng(0).uniform(size=(ROWS, COLUMNS, 1)).repeat(3, 2)
     shown = [picture(n, behind=behind) * (0.45 if n == 2 else 1.0) for n in range(4)]

@@ -1,7 +1,5 @@
 """Where a frame shows smoke."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from scipy import ndimage
@@ -21,13 +19,12 @@ from smokelift.footage.noise import Noise, lasting_noise
 from tests.engine.films import HEIGHT, WIDTH, clear_plate, film, overlap, wall
 
 
-def test_smoke_over_most_of_the_picture_is_not_noise(tmp_path: Path) -> None:
+def test_smoke_over_most_of_the_picture_is_not_noise(tmp_path) -> None:
     def billows(n: int) -> np.ndarray:
         rows, columns = np.mgrid[:HEIGHT, :WIDTH]
         return np.where(columns < 0.65 * WIDTH, 0.3 + 0.25 * np.sin(rows / 4 + 0.8 * n), 0.0)
 
     for name, behind in (("black", np.zeros((HEIGHT, WIDTH, 3))), ("wall", wall(0.2, 0.5))):
-        (tmp_path / name).mkdir()
         clip = film(tmp_path / name, behind, billows, 0.9)
         plate, _ = known_plate(behind, clip)
         assert 0.5 < plate.noise.total.mean() * 255 < 2.0
@@ -42,7 +39,7 @@ def test_noise_is_smoothed_as_far_as_that_helps() -> None:
     assert smoothing(Noise(50 * codes, codes)) == MAX_SMOOTHING
 
 
-def test_faint_smoke_is_seen_in_noise(tmp_path: Path) -> None:
+def test_faint_smoke_is_seen_in_noise(tmp_path) -> None:
     rows, columns = np.mgrid[:HEIGHT, :WIDTH]
     veil = np.where(np.hypot(rows - 36, columns - 28) < 16, 0.09, 0.0)
     truth = wall(0.2, 0.3)
@@ -53,7 +50,7 @@ def test_faint_smoke_is_seen_in_noise(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("noise", [1.0, 3.0, 8.0])
-def test_a_faint_rim_counts_as_far_as_it_is_certain(noise: float) -> None:
+def test_a_faint_rim_counts_as_far_as_it_is_certain(noise) -> None:
     """It falls to nothing with the light. A veil by itself is as certain, and a clear background has none."""
     columns = np.broadcast_to(np.arange(260), (120, 260))
     light = np.where(columns < 40, 25 * noise, 6 * noise * np.clip((100 - columns) / 60, 0, 1))

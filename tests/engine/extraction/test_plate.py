@@ -7,13 +7,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from smokelift import Background, Clip
 from smokelift.extraction.backdrop import find_backdrop
 from smokelift.extraction.matte import matte
 from smokelift.extraction.plate import FINEST, finest_detail, known_plate, without_noise_light
-from smokelift.footage.clip import Clip
 from smokelift.footage.images import srgb_to_linear
 from smokelift.output.images import write_image
-from smokelift.scene import Background
 from tests.engine.films import (
     COUNT,
     HEIGHT,
@@ -30,7 +29,7 @@ from tests.engine.films import (
 )
 
 
-def test_what_does_not_fit_is_refused(tmp_path: Path) -> None:
+def test_what_does_not_fit_is_refused(tmp_path) -> None:
     write_image(tmp_path / "still.png", wall(0.2, 0.8))
     clip = Clip.open(tmp_path / "still.png")
     plate = plate_of(clip)
@@ -43,10 +42,8 @@ def test_what_does_not_fit_is_refused(tmp_path: Path) -> None:
             known_plate(background, clip)
 
 
-def test_a_plate_for_every_frame_of_the_clips_file(tmp_path: Path) -> None:
+def test_a_plate_for_every_frame_of_the_clips_file(tmp_path) -> None:
     """Each frame has its own, the noise is that of the difference, and the smoke is found before it."""
-    for name in ("clip", "plate"):
-        (tmp_path / name).mkdir()
     wide = passing_wall()
     pan(tmp_path / "clip", wide, 1.0)
     plates = pan(tmp_path / "plate", wide, 0.0)
@@ -66,7 +63,7 @@ def test_a_plate_for_every_frame_of_the_clips_file(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("pixels", ["yuv420p", "yuv422p", "yuv444p"])
-def test_a_given_plate_has_the_colors_of_the_clips_file(tmp_path: Path, pixels: str) -> None:
+def test_a_given_plate_has_the_colors_of_the_clips_file(tmp_path, pixels) -> None:
     """A video with one color for several pixels shows saturated edges elsewhere than the picture that was filmed."""
     codes = np.full((HEIGHT, WIDTH, 3), 90, np.uint8)
     codes[HEIGHT // 3 : 2 * HEIGHT // 3 + 1, WIDTH // 3 : 2 * WIDTH // 3 + 1] = (20, 40, 220)
@@ -84,7 +81,7 @@ def test_a_given_plate_has_the_colors_of_the_clips_file(tmp_path: Path, pixels: 
 
 
 @pytest.mark.parametrize("codes", [0.0, 13.0, 51.0])
-def test_smoke_is_found_before_a_noisy_black(tmp_path: Path, codes: float) -> None:
+def test_smoke_is_found_before_a_noisy_black(tmp_path, codes) -> None:
     """Noise that is clipped at black raises its mean, which is neither smoke nor a lack of certainty."""
     clip = film(tmp_path, np.zeros((HEIGHT, WIDTH, 3), np.float32), puff, 0.5, codes)
     plate, _ = known_plate((0.0, 0.0, 0.0), clip)
@@ -100,7 +97,7 @@ def test_smoke_is_found_before_a_noisy_black(tmp_path: Path, codes: float) -> No
             assert mask[puff(n) == 0.0].mean() < 0.1
 
 
-def test_every_frame_gets_the_exposure_of_its_background(tmp_path: Path) -> None:
+def test_every_frame_gets_the_exposure_of_its_background(tmp_path) -> None:
     """After a step in the middle and in a flash, and the smoke of no frame is lost."""
     truth = wall(0.2, 0.5)
     clip = film(tmp_path, truth, puff, 0.6)
@@ -113,7 +110,7 @@ def test_every_frame_gets_the_exposure_of_its_background(tmp_path: Path) -> None
         assert overlap(matte(found.clip.frame(n), found.plate).mask, puff(n) > 0.05) > 0.7
 
 
-def test_noise_does_not_brighten_a_clip(tmp_path: Path) -> None:
+def test_noise_does_not_brighten_a_clip(tmp_path) -> None:
     """The mean of noisy sRGB values is brighter in linear light, and what is brighter would count as smoke."""
     truth = wall(0.2, 0.6)
     noisy = film(tmp_path, truth, lambda n: np.zeros(truth.shape[:2]), 0.6, 25.0)
@@ -124,14 +121,14 @@ def test_noise_does_not_brighten_a_clip(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("quantizer", "finest"), [(10.0, 2.0), (18.0, 2.0), (28.0, 4.0), (50.0, 8.0), (None, 2.83)])
-def test_a_coarse_codec_keeps_coarse_detail_alone(monkeypatch, quantizer: float | None, finest: float) -> None:
+def test_a_coarse_codec_keeps_coarse_detail_alone(monkeypatch, quantizer, finest) -> None:
     monkeypatch.setattr("smokelift.extraction.plate.median_quantizer", lambda path: quantizer)
     assert finest_detail(SimpleNamespace(path=Path("clip.mp4"))) == pytest.approx(finest, abs=0.01)
     assert finest_detail(SimpleNamespace(path=Path("clip_####.png"))) == 2.0
 
 
 @pytest.mark.parametrize("how", ["picture", "frame", "color", "found"])
-def test_a_codec_tells_of_given_pictures_alone(tmp_path: Path, monkeypatch, how: str) -> None:
+def test_a_codec_tells_of_given_pictures_alone(tmp_path, monkeypatch, how) -> None:
     """One color has no detail, and a plate that many frames show has lost what they have."""
     monkeypatch.setattr("smokelift.extraction.backdrop.finest_detail", lambda clip: 5.0)
     behind = wall(0.1, 0.5)

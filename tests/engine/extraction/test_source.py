@@ -8,7 +8,6 @@ from scipy import ndimage
 
 from smokelift.extraction.element import Cells, first_source, shows_transmittance, usual_source
 from smokelift.extraction.plate import Plate
-from smokelift.footage.images import Picture
 from smokelift.footage.noise import lasting_noise
 from tests.engine.extraction.test_element import (
     PLATES,
@@ -105,7 +104,7 @@ def test_a_plate_shows_transmittance_by_its_detail_or_by_its_hue() -> None:
 
 @pytest.mark.parametrize("brightness", [0.3, 1.0, 4.0])
 @pytest.mark.parametrize("image", PLATES.values(), ids=PLATES.keys())
-def test_the_source_is_found_from_the_pictures(brightness: float, image: Picture) -> None:
+def test_the_source_is_found_from_the_pictures(brightness, image) -> None:
     """Within 20 %, of dim smoke as of smoke that is brighter than its plate; its color within 7 %, by a sky's hue."""
     clear = TRANSMITTANCE[..., None]
     picture = filmed((1 - clear) * RADIANCE * brightness + clear * image)

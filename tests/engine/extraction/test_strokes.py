@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from smokelift import Background, Clip
 from smokelift.extraction.backdrop import Backdrop, find_backdrop
 from smokelift.extraction.matte import matte
 from smokelift.extraction.plate import Plate
-from smokelift.footage.clip import Clip
 from smokelift.footage.frame_source import ClipError
 from smokelift.footage.images import ImageError, srgb_to_linear
 from smokelift.output.images import write_image
-from smokelift.scene import Background
 from tests.engine.films import COUNT, HEIGHT, WIDTH, codes_apart, film, overlap, plate_of, puff, wall
 
 ROWS, COLUMNS = np.mgrid[:HEIGHT, :WIDTH]
@@ -45,7 +44,7 @@ def opacity_errors(found: Backdrop, smoke: np.ndarray, truth: np.ndarray, number
     return float(np.sqrt(np.mean(np.square(shown - smoke)[truth])))
 
 
-def test_one_green_stroke_finds_smoke_that_stands_still(tmp_path: Path) -> None:
+def test_one_green_stroke_finds_smoke_that_stands_still(tmp_path) -> None:
     """Without it the plume is the plate's, and none of the smoke is found."""
     clip, there = film(tmp_path, GRADIENT, lambda _: PLUME, 1.0), PLUME > 0
     without = find_backdrop(clip, None, None)
@@ -64,7 +63,7 @@ def test_one_green_stroke_finds_smoke_that_stands_still(tmp_path: Path) -> None:
     np.testing.assert_array_equal(scaled.plate.confidence, plate.confidence)
 
 
-def test_nothing_that_is_painted_red_is_smoke(tmp_path: Path) -> None:
+def test_nothing_that_is_painted_red_is_smoke(tmp_path) -> None:
     """A ball that swings before a wall, beside a puff that rises; a frame that is darker as well."""
     tiles, box = wall(0.2, 0.5), (COLUMNS > 40) & (ROWS < 30)
 
@@ -86,13 +85,12 @@ def test_nothing_that_is_painted_red_is_smoke(tmp_path: Path) -> None:
         assert overlap(masks[0][:, :40], np.roll(puff(number), -14, axis=1)[:, :40] > 0.05) > 0.7
 
 
-def test_what_is_painted_blue_is_behind_and_continued(tmp_path: Path) -> None:
+def test_what_is_painted_blue_is_behind_and_continued(tmp_path) -> None:
     """Smoke stands before a bright stripe of its width, and leaves a gap in most of the frames, or never."""
     stripe = GRADIENT + 0.2 * np.exp(-(((COLUMNS - 28) / 6) ** 2))[..., None]
     gap = (PLUME > 0) & (ROWS > 30) & (ROWS < 40)
     clip = film(tmp_path, stripe, lambda n: np.where(gap & (n % 5 > 0), 0, PLUME), 1.0)
     green = (PLUME > 0) & ~gap
-    (tmp_path / "closed").mkdir()
     _, alone = painted(film(tmp_path / "closed", stripe, lambda _: PLUME, 1.0), (PLUME > 0, GREEN))
     _, plate = painted(clip, (green, GREEN), (gap, BLUE))
     assert (plate.confidence[gap] == 1).all() and (plate.confidence[green] == 0).mean() > 0.9
@@ -101,7 +99,7 @@ def test_what_is_painted_blue_is_behind_and_continued(tmp_path: Path) -> None:
     assert codes_apart(plate.image, stripe)[near].mean() < 0.6 * codes_apart(alone.image, stripe)[near].mean()
 
 
-def test_a_given_plate_is_changed_in_the_strokes_alone(tmp_path: Path) -> None:
+def test_a_given_plate_is_changed_in_the_strokes_alone(tmp_path) -> None:
     clip = film(tmp_path, GRADIENT, puff, 1.0)
     moved = (ROWS < 12) & (COLUMNS < 12)
     plate = np.where(moved[..., None], 0.9, GRADIENT)
@@ -112,7 +110,7 @@ def test_a_given_plate_is_changed_in_the_strokes_alone(tmp_path: Path) -> None:
     assert found.source == "given" and (mended.confidence == 1).all()
 
 
-def test_a_stroke_says_nothing_of_what_is_unknown_elsewhere(tmp_path: Path) -> None:
+def test_a_stroke_says_nothing_of_what_is_unknown_elsewhere(tmp_path) -> None:
     random = np.random.default_rng(0)
     flicker = [random.uniform(0.4, 0.9) for _ in range(COUNT)]
     restless = np.abs(COLUMNS - 10) < 5
@@ -124,7 +122,7 @@ def test_a_stroke_says_nothing_of_what_is_unknown_elsewhere(tmp_path: Path) -> N
     assert codes_apart(plate.image, before.image)[unknown].max() < 3
 
 
-def test_green_keeps_what_clear_moments_show(tmp_path: Path) -> None:
+def test_green_keeps_what_clear_moments_show(tmp_path) -> None:
     """Smoke sways before a wall of tiles: over all of it or none, the strokes leave what frames show as it was."""
     tiles = wall(0.2, 0.5)
     clip = film(tmp_path, tiles, lambda n: np.roll(PLUME, round(16 * np.sin(n)), axis=1), 0.9)
@@ -136,7 +134,7 @@ def test_green_keeps_what_clear_moments_show(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("given", [None, (0.0, 0.0, 0.0)])
-def test_green_before_black_is_before_black(tmp_path: Path, given: tuple[float, ...] | None) -> None:
+def test_green_before_black_is_before_black(tmp_path, given) -> None:
     """Also where smoke stands still, which is an object before black without the stroke."""
     clip = film(tmp_path, np.zeros((HEIGHT, WIDTH, 3)), lambda n: np.where(ROWS > 60, PLUME, puff(n)), 0.6, noise=0)
     _, plate = painted(clip, (np.ones((HEIGHT, WIDTH), np.bool_), GREEN), color=given)
@@ -144,7 +142,7 @@ def test_green_before_black_is_before_black(tmp_path: Path, given: tuple[float, 
     assert plate.image.max() < 1e-3
 
 
-def test_strokes_that_say_nothing_are_refused(tmp_path: Path) -> None:
+def test_strokes_that_say_nothing_are_refused(tmp_path) -> None:
     clip, white = film(tmp_path, GRADIENT, puff, 1.0), (255, 255, 255, 255)
     for lines, width, said in (
         ((), 1, "nothing is painted"),

@@ -51,7 +51,7 @@ def found(clip: Clip) -> Plate:
 @pytest.mark.parametrize(
     ("steps", "noise"), [(False, 1.0), (True, 1.0), (False, 6.0)], ids=["steady", "steps", "noisy"]
 )
-def test_a_wall_is_found_to_the_last_pixel(steps: bool, noise: float) -> None:
+def test_a_wall_is_found_to_the_last_pixel(steps, noise) -> None:
     truth = wall()
     gains = np.repeat([1.0, 1.25, 0.8, 1.0], COUNT // 4) if steps else None
     plate = found(film(truth, gains, noise=noise))

@@ -9,17 +9,13 @@ from tests.engine.films import HEIGHT, WIDTH, puff, wall
 GAINS = np.array([1.3, 1.0, 0.8], np.float32)
 
 
-def test_a_gain_is_found_beside_smoke() -> None:
+def test_a_gain_is_found_beside_smoke_which_is_none() -> None:
     behind = wall(0.3, 0.7).astype(np.float32)
     alpha = puff(12)[..., None]
     seen = (behind * (1 - alpha) + 0.4 * alpha) * GAINS
     np.testing.assert_allclose(gain_of(seen.astype(np.float32), behind), GAINS, rtol=0.01)
-
-
-def test_smoke_is_no_gain() -> None:
     black = np.zeros((HEIGHT, WIDTH, 3), np.float32)
     assert (gain_of(black + 0.3, black) == 1).all()
-    behind = wall(0.3, 0.7).astype(np.float32)
     rows = np.arange(HEIGHT)[:, None, None]
     assert (gain_of(np.where(rows < 0.85 * HEIGHT, 0.5 * behind + 0.2, behind), behind) == 1).all()
 
@@ -33,7 +29,7 @@ def test_a_flash_has_its_own_gain() -> None:
 
 
 @pytest.mark.parametrize(("value", "shown"), [(0.0, False), (0.002, False), (0.2, True), (1.0, False)])
-def test_black_and_white_show_no_exposure(value: float, shown: bool) -> None:
+def test_black_and_white_show_no_exposure(value, shown) -> None:
     background = np.full((40, 60, 3), value, np.float32)
     assert shows_exposure(background) is shown
     background[:6, :6] = 0.3

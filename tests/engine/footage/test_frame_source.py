@@ -1,30 +1,27 @@
 """What formats of clips share: what alpha says is behind the smoke, the focal length, frames as they are stored."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from PIL import Image
 
+from smokelift import Background, Clip
 from smokelift.extraction.backdrop import find_backdrop
-from smokelift.footage.clip import Clip
 from smokelift.footage.frame_source import FrameSource, Layer, StoredPicture, backdrop_of
 from smokelift.footage.images import area_average, code_values, linear_to_srgb, srgb_to_linear
-from smokelift.scene import Background
 from tests.engine.films import encode
 
 QUICKTIME = "com.apple.quicktime.camera.focal_length.35mm_equivalent"
 
 
 @pytest.mark.parametrize(("said", "lens"), [("26", 26.0), ("13.5", 13.5), ("0", None), ("nan", None), ("wide", None)])
-def test_quicktime_tags(tmp_path: Path, said: str, lens: float | None) -> None:
+def test_quicktime_tags(tmp_path, said, lens) -> None:
     how = {"muxer": {"movflags": "use_metadata_tags"}, "metadata": {QUICKTIME: said}}
     path = encode(tmp_path / "a.mov", np.zeros((1, 16, 32, 3), np.uint8), **how)
     assert Clip.open(path).lens == lens
 
 
 @pytest.mark.parametrize("said", [28, 0, None])
-def test_exif(tmp_path: Path, said: int | None) -> None:
+def test_exif(tmp_path, said) -> None:
     tags = Image.Exif()
     if said is not None:
         tags.get_ifd(0x8769)[0xA405] = said
@@ -40,7 +37,7 @@ def layer(gray: float, alpha: float | None) -> Layer:
 
 
 @pytest.mark.parametrize(("gray", "backdrop"), [(0.05, 1.0), (0.9, 0.0)])
-def test_dark_smoke_stands_before_white_and_bright_smoke_before_black(gray: float, backdrop: float) -> None:
+def test_dark_smoke_stands_before_white_and_bright_smoke_before_black(gray, backdrop) -> None:
     clip = [layer(gray, 0.0), layer(gray, 0.5)]
     source = FrameSource()
     source.backdrop = backdrop_of(clip)
@@ -49,7 +46,7 @@ def test_dark_smoke_stands_before_white_and_bright_smoke_before_black(gray: floa
     np.testing.assert_allclose(shown[0, [0, 5]], [[0.5 * gray + 0.5 * backdrop] * 3, [backdrop] * 3], rtol=1e-6)
 
 
-def test_the_backdrop_is_the_background_and_nothing_is_estimated(tmp_path: Path) -> None:
+def test_the_backdrop_is_the_background_and_nothing_is_estimated(tmp_path) -> None:
     for n in range(4):
         codes = np.full((24, 32, 4), 40, np.uint8)
         codes[..., 3] = 0
@@ -69,7 +66,7 @@ def test_the_backdrop_is_the_background_and_nothing_is_estimated(tmp_path: Path)
 
 
 @pytest.fixture(params=[np.uint8, np.uint16])
-def picture(request: pytest.FixtureRequest) -> StoredPicture:
+def picture(request) -> StoredPicture:
     top = np.iinfo(request.param).max
     codes = np.random.default_rng(0).integers(0, top, (48, 64, 3), request.param, endpoint=True)
     return StoredPicture(codes, code_values(top))
@@ -79,7 +76,7 @@ SIZES = pytest.mark.parametrize("size", [(7, 5), (31, 40), (64, 48), (80, 40), (
 
 
 @SIZES
-def test_averages(picture: StoredPicture, size: tuple[int, int]) -> None:
+def test_averages(picture, size) -> None:
     for part in (np.s_[:], np.s_[3:41, 5:60]):
         some = picture.cut(lambda pixels, part=part: pixels[part])
         assert np.array_equal(some.averaged(*size), area_average(picture.linear()[part], *size))
@@ -89,7 +86,7 @@ def test_averages(picture: StoredPicture, size: tuple[int, int]) -> None:
 
 @SIZES
 @pytest.mark.parametrize("first", [0, 1])
-def test_averages_of_a_chequerboard(picture: StoredPicture, size: tuple[int, int], first: int) -> None:
+def test_averages_of_a_chequerboard(picture, size, first) -> None:
     linear, (rows, columns) = picture.linear(), np.indices((48, 64))
     for color in (0, 1):
         board = ((rows + columns) % 2 == (first + color) % 2).astype(np.float32)
@@ -99,7 +96,7 @@ def test_averages_of_a_chequerboard(picture: StoredPicture, size: tuple[int, int
             assert np.array_equal(image.chequered(*size, first)[color], expected)
 
 
-def test_weighted_sums(picture: StoredPicture) -> None:
+def test_weighted_sums(picture) -> None:
     edges = np.array([0, 3, 3, 48], np.int32), np.array([0, 1, 18, 30, 64], np.int32)
     random = np.random.default_rng(0)
     weights, sums = random.random((3, 4, 3), np.float32), random.random((48, 64, 3), np.float32)
@@ -111,7 +108,7 @@ def test_weighted_sums(picture: StoredPicture) -> None:
         assert np.array_equal(found, expected)
 
 
-def test_functions_of_values(picture: StoredPicture) -> None:
+def test_functions_of_values(picture) -> None:
     for image in (picture, StoredPicture(picture.linear())):
         assert image.size == (64, 48)
         assert np.array_equal(image.through(linear_to_srgb), linear_to_srgb(picture.linear()))

@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from smokelift import Background, Clip
 from smokelift.extraction.backdrop import find_backdrop
 from smokelift.extraction.plate import Plate, cleared, known_plate, uncovered
-from smokelift.footage.clip import Clip
 from smokelift.footage.frame_source import ClipError
 from smokelift.footage.images import ImageError
 from smokelift.footage.mask import Mask
 from smokelift.output.images import write_image, write_video
-from smokelift.scene import Background
 from tests.engine.films import COUNT, HEIGHT, WIDTH, codes_apart, film, plate_of, puff, wall
 
 SIDE = 44
@@ -30,7 +29,6 @@ def filmed(folder: Path, with_block: bool = True, drift: float = 0.0) -> Path:
 
     It gets brighter by the fraction ``drift``.
     """
-    folder.mkdir()
     clip = film(folder, wall(0.3, 0.5), puff, 0.8)
     for n, shown in enumerate(clip) if drift else ():
         write_image(folder / f"frame_{n:03d}.png", shown * np.float32(1 + drift * n / (COUNT - 1)))
@@ -49,7 +47,7 @@ def painted(file: Path, values: np.ndarray) -> Path:
 
 
 @pytest.fixture
-def mask(tmp_path: Path) -> Path:
+def mask(tmp_path) -> Path:
     """White but for the block's columns."""
     return painted(tmp_path / "mask.png", np.where(np.arange(WIDTH) < SIDE, 255, 0) * np.ones((HEIGHT, 1)))
 
@@ -59,13 +57,13 @@ def mask(tmp_path: Path) -> Path:
     [([[0, 120, 140, 255]], [0, 0, 1, 1]), ([[(255, 255, 255, 255)] * 2 + [(255, 255, 255, 0)] * 2], [1, 1, 0, 0])],
     ids=["gray", "transparent"],
 )
-def test_the_nearer_of_black_and_white_counts_at_the_clips_size(tmp_path: Path, values: list, shown: list) -> None:
+def test_the_nearer_of_black_and_white_counts_at_the_clips_size(tmp_path, values, shown) -> None:
     seen = Mask.open(painted(tmp_path / "mask.png", np.array(values)), range(1), (80, 20)).seen(0, 8, 2)
     np.testing.assert_array_equal(seen, [np.repeat(np.array(shown, bool), 2)] * 2)
 
 
 @pytest.mark.parametrize("kind", ["pictures", "video"])
-def test_a_mask_a_frame_belongs_to_the_frames_of_the_file(tmp_path: Path, kind: str) -> None:
+def test_a_mask_a_frame_belongs_to_the_frames_of_the_file(tmp_path, kind) -> None:
     clip = filmed(tmp_path / "clip")
     pictures = [np.repeat((np.arange(WIDTH) < 16 + n)[None, :, None], HEIGHT, 0) * np.ones(3) for n in range(COUNT)]
     if kind == "video":
@@ -78,12 +76,11 @@ def test_a_mask_a_frame_belongs_to_the_frames_of_the_file(tmp_path: Path, kind: 
     with Clip.open(clip, frames=(10, 15), mask=file) as part:
         for n in (0, 5):
             seen = part.seen(n, WIDTH, HEIGHT)
-            assert seen is not None
             assert abs(int(seen[HEIGHT // 2].sum()) - (16 + 10 + n)) <= (kind == "video")
         assert part.whole().seen(0, WIDTH, HEIGHT)[0].sum() <= 17
 
 
-def test_a_shorter_sequence_of_masks_shortens_what_is_looked_at(tmp_path: Path) -> None:
+def test_a_shorter_sequence_of_masks_shortens_what_is_looked_at(tmp_path) -> None:
     clip = filmed(tmp_path / "clip")
     for n in range(8):
         painted(tmp_path / f"mask_{n}.png", np.full((HEIGHT, WIDTH), 255))
@@ -104,7 +101,7 @@ def test_a_shorter_sequence_of_masks_shortens_what_is_looked_at(tmp_path: Path) 
         ({f"mask_{n:02d}.png": np.full((4, 4), 255) for n in range(COUNT) if n != 3}, r"mask_03.* is missing"),
     ],
 )
-def test_a_wrong_mask_is_refused(tmp_path: Path, values: dict[str, np.ndarray | None], said: str) -> None:
+def test_a_wrong_mask_is_refused(tmp_path, values, said) -> None:
     for name, value in values.items():
         if value is None:
             (tmp_path / name).write_text("no picture")
@@ -115,7 +112,7 @@ def test_a_wrong_mask_is_refused(tmp_path: Path, values: dict[str, np.ndarray | 
         Clip.open(filmed(tmp_path / "clip"), mask=mask)
 
 
-def test_frames_are_continued_where_they_are_hidden(tmp_path: Path, mask: Path) -> None:
+def test_frames_are_continued_where_they_are_hidden(tmp_path, mask) -> None:
     file = filmed(tmp_path / "clip")
     with Clip.open(file) as plain, Clip.open(file, mask=mask) as clip:
         for n in (0, 12):
@@ -126,7 +123,7 @@ def test_frames_are_continued_where_they_are_hidden(tmp_path: Path, mask: Path) 
         assert plain.seen(3, WIDTH, HEIGHT) is None
 
 
-def test_background_and_noise_are_those_of_what_is_seen(tmp_path: Path, mask: Path) -> None:
+def test_background_and_noise_are_those_of_what_is_seen(tmp_path, mask) -> None:
     """A block that moves over half of the picture changes neither; without the mask it is in both."""
     with Clip.open(filmed(tmp_path / "clean", with_block=False)) as clean:
         expected = plate_of(clean)
@@ -140,9 +137,7 @@ def test_background_and_noise_are_those_of_what_is_seen(tmp_path: Path, mask: Pa
 
 
 @pytest.mark.parametrize("frames", [None, (10, 12)])
-def test_a_cleared_clip_shows_its_background_at_one_exposure(
-    tmp_path: Path, mask: Path, frames: tuple[int, int] | None
-) -> None:
+def test_a_cleared_clip_shows_its_background_at_one_exposure(tmp_path, mask, frames) -> None:
     """The exposure is measured beside the mask; also beside the frames that are used, as the plate is found there."""
     file = filmed(tmp_path / "clip")
     plate = Plate(wall(0.3, 0.5).astype(np.float32) / 2, np.ones((HEIGHT, WIDTH), np.float32), None)
@@ -158,7 +153,7 @@ def test_a_cleared_clip_shows_its_background_at_one_exposure(
 
 
 @pytest.mark.parametrize("drift", [0.0, 0.3])
-def test_what_is_hidden_all_the_time_is_shown_as_it_was_filmed(tmp_path: Path, mask: Path, drift: float) -> None:
+def test_what_is_hidden_all_the_time_is_shown_as_it_was_filmed(tmp_path, mask, drift) -> None:
     file = filmed(tmp_path / "clip", with_block=False, drift=drift)
     with Clip.open(file, mask=mask) as clip:
         found = plate_of(clip)
@@ -172,7 +167,7 @@ def test_what_is_hidden_all_the_time_is_shown_as_it_was_filmed(tmp_path: Path, m
         assert uncovered(found, clip) is found
 
 
-def test_what_a_tight_mask_hides_is_still_background(tmp_path: Path) -> None:
+def test_what_a_tight_mask_hides_is_still_background(tmp_path) -> None:
     """Where smoke never leaves what the mask shows, the picture around it tells what is behind, not black."""
     truth = wall(0.3, 0.5)
     film(tmp_path, truth, lambda n: np.clip(1.4 * puff(12 + 0.3 * np.sin(n)), 0, 1), 0.8).close()

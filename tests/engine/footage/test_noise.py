@@ -15,7 +15,7 @@ def drifting(frames: int, amount: float) -> np.ndarray:
 
 
 @pytest.mark.parametrize("codes", [0.0, 1.0, 4.0, 25.0])
-def test_white_noise_is_told_from_smoke_that_fills_the_picture(codes: float) -> None:
+def test_white_noise_is_told_from_smoke_that_fills_the_picture(codes) -> None:
     random = np.random.default_rng(1)
     fog = drifting(8, 0.15)
     noisy = fog + random.normal(0, codes / 255, fog.shape)
@@ -25,7 +25,7 @@ def test_white_noise_is_told_from_smoke_that_fills_the_picture(codes: float) -> 
 
 @pytest.mark.parametrize("codes", [0.5, 1.0, 3.0])
 @pytest.mark.parametrize("smoke", [0.0, 0.4])
-def test_the_spread_of_what_is_clear_is_told_from_smoke(codes: float, smoke: float) -> None:
+def test_the_spread_of_what_is_clear_is_told_from_smoke(codes, smoke) -> None:
     random = np.random.default_rng(2)
     deviations = random.normal(0, codes / 255, 40000)
     covered = random.uniform(size=deviations.size) < smoke
@@ -33,7 +33,7 @@ def test_the_spread_of_what_is_clear_is_told_from_smoke(codes: float, smoke: flo
     assert 255 * peak_spread(deviations) == pytest.approx(codes, rel=0.3)
 
 
-def test_what_neighbors_share_lasts(codes: float = 3.0) -> None:
+def test_what_neighbors_share_lasts(codes=3.0) -> None:
     random = np.random.default_rng(3)
     blocks = random.normal(0, codes / 255, (12, 20, 30, 3))
     pixels = blocks.repeat(BLOCK, 1).repeat(BLOCK, 2) + random.normal(0, 2 / 255, (12, 20 * BLOCK, 30 * BLOCK, 3))
@@ -43,7 +43,7 @@ def test_what_neighbors_share_lasts(codes: float = 3.0) -> None:
 
 
 @pytest.mark.parametrize("shape", [(1, 3), (2, 70), (5, 4, 3), (16, 9, 11, 3), (31, 64), (40, 1)])
-def test_medians_are_those_of_numpy(shape: tuple[int, ...]) -> None:
+def test_medians_are_those_of_numpy(shape) -> None:
     """Of one frame, and where values come more than once."""
     random = np.random.default_rng(0)
     for values in (random.standard_normal(shape).astype(np.float32), random.integers(0, 3, shape).astype(np.float32)):

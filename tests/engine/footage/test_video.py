@@ -34,7 +34,7 @@ def server() -> Iterator[socket.socket]:
 @pytest.mark.parametrize(
     "name", ["http:/127.0.0.1:{}/a.mp4", "pipe:0.mp4", "concat:a|b.mp4", "a%03d.mp4", "-i.mp4", "crypto:x.mp4"]
 )
-def test_any_name_is_that_of_a_file(tmp_path: Path, server: socket.socket, monkeypatch, name: str) -> None:
+def test_any_name_is_that_of_a_file(tmp_path, server, monkeypatch, name) -> None:
     monkeypatch.chdir(tmp_path)
     path = Path(name.format(server.getsockname()[1]))
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -46,7 +46,7 @@ def test_any_name_is_that_of_a_file(tmp_path: Path, server: socket.socket, monke
 @pytest.mark.parametrize(
     "text", ["#EXTM3U\n#EXT-X-TARGETDURATION:9\n#EXTINF:9,\n{}\n#EXT-X-ENDLIST\n", "ffconcat version 1.0\nfile {}\n"]
 )
-def test_nothing_is_fetched_from_what_a_file_refers_to(tmp_path: Path, server: socket.socket, text: str) -> None:
+def test_nothing_is_fetched_from_what_a_file_refers_to(tmp_path, server, text) -> None:
     path = tmp_path / ("list.m3u8" if text.startswith("#") else "list.ffconcat")
     path.write_text(text.format(f"http://127.0.0.1:{server.getsockname()[1]}/clip.ts"))
     with pytest.raises(ClipError):
@@ -65,38 +65,38 @@ def png(width: int, height: int, depth: int) -> bytes:
     )
 
 
-def test_a_16_bit_png_with_a_pattern_for_a_name(tmp_path: Path) -> None:
+def test_a_16_bit_png_with_a_pattern_for_a_name(tmp_path) -> None:
     (tmp_path / "a%03d.png").write_bytes(png(2, 3, 16))
     assert read_image(tmp_path / "a%03d.png").shape == (3, 2, 3)
 
 
 @pytest.mark.parametrize("depth", [8, 16])
 @pytest.mark.parametrize("size", [(100_000, 100_000), (30_000, 30_000), (2**31 - 1, 1)])
-def test_a_picture_that_says_it_is_huge_is_not_believed(tmp_path: Path, depth: int, size: tuple[int, int]) -> None:
+def test_a_picture_that_says_it_is_huge_is_not_believed(tmp_path, depth, size) -> None:
     (tmp_path / "plate.png").write_bytes(png(*size, depth))
     with pytest.raises(ImageError, match="cannot be read"):
         read_image(tmp_path / "plate.png")
 
 
 @pytest.mark.parametrize("name", ["clip.mp4", "frame_0001.png", "plate.hdr"])
-def test_a_pipe_is_not_waited_for(tmp_path: Path, name: str) -> None:
+def test_a_pipe_is_not_waited_for(tmp_path, name) -> None:
     os.mkfifo(tmp_path / name)
     with pytest.raises(ValueError, match=r"is a pipe or a device|no such file"):
         Clip.open(tmp_path / name)
 
 
 @pytest.mark.parametrize("quantizer", [10, 30, 48])
-def test_the_quantizer_is_that_of_the_encoder(tmp_path: Path, quantizer: int) -> None:
+def test_the_quantizer_is_that_of_the_encoder(tmp_path, quantizer) -> None:
     path = coded(tmp_path / "clip.mp4", wall(0.2, 0.5), 0.6, qp=str(quantizer))
     assert median_quantizer(path) == pytest.approx(quantizer, abs=3)
 
 
 @pytest.mark.parametrize(("name", "codec"), [("a.mp4", "mpeg4"), ("a.mkv", "ffv1"), ("a.webm", "libvpx-vp9")])
-def test_other_codecs_tell_nothing(tmp_path: Path, name: str, codec: str) -> None:
+def test_other_codecs_tell_nothing(tmp_path, name, codec) -> None:
     assert median_quantizer(coded(tmp_path / name, wall(0.2, 0.5), 0.6, codec)) is None
 
 
-def test_pictures_and_files_that_are_no_video_tell_nothing(tmp_path: Path) -> None:
+def test_pictures_and_files_that_are_no_video_tell_nothing(tmp_path) -> None:
     clip = film(tmp_path, wall(0.2, 0.5), puff, 0.6)
     text = tmp_path / "a.mp4"
     text.write_text("no video")

@@ -6,7 +6,7 @@ from smokelift.output import vdb, writer
 
 
 @pytest.fixture
-def no_vdb(monkeypatch: pytest.MonkeyPatch) -> None:
+def no_vdb(monkeypatch) -> None:
     """No OpenVDB module can be found."""
 
     def missing() -> None:

@@ -1,17 +1,17 @@
 """A sequence of a few voxels, made up of noise."""
 
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from smokelift import Sequence, Velocity
 from smokelift.output import vdb
-from smokelift.output.sequence import Sequence
 from smokelift.output.writer import SequenceWriter
 from smokelift.scene import Camera, ClipSource, DirectionalLight, Domain, Scene, completed
-from smokelift.transport import Velocity
 
 SCENE = completed(
     Scene(
@@ -22,6 +22,7 @@ SCENE = completed(
         scattering="unshadowed",
     )
 )
+BURNING = replace(SCENE, medium=replace(SCENE.medium, flame_color=(1.0, 0.4, 0.1)))
 SETTINGS = {"quality": "draft", "density": {"iterations": 12}}
 
 
@@ -34,16 +35,19 @@ def frame(number: int) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray, np.nda
     return rho, (x, y, z)
 
 
-def write(directory: Path, numbers: Iterable[int], *, npz: bool = True, **options: Any) -> None:
-    """Write frames and complete the sequence."""
-    with SequenceWriter(directory, SCENE, SETTINGS, npz=npz, **options) as writer:
+def write(
+    directory: Path, numbers: Iterable[int], scene: Scene = SCENE, flame: np.ndarray | None = None, **options: Any
+) -> Sequence:
+    """Write frames, the first perhaps with a flame, and complete the sequence."""
+    with SequenceWriter(directory, scene, SETTINGS, **{"npz": True, **options}) as writer:
         for number in numbers:
-            writer.write(number, *frame(number), {"loss": 1.0 / number})
+            writer.write(number, *frame(number), {"loss": 1.0 / number}, flame=flame)
+            flame = None
+    return Sequence.open(directory)
 
 
 def at_rest(scene: Scene, densities: Iterable[np.ndarray], directory: Path) -> Sequence:
     """Volumes without motion as a finished sequence."""
-    assert scene.domain is not None
     rest = Velocity.zero(scene.domain.resolution, scene.domain.voxel_size).faces
     with SequenceWriter(directory, completed(scene), {}, npz=True) as writer:
         for number, density in enumerate(densities, 1):

@@ -51,14 +51,14 @@ def saved(values: object) -> bytes:
         saved(np.zeros((4, 5, 7), np.float32)),
     ],
 )
-def test_a_member_that_is_no_sound_array_is_refused(tmp_path: Path, member: bytes) -> None:
+def test_a_member_that_is_no_sound_array_is_refused(tmp_path, member) -> None:
     zipped(tmp_path / "a.npz", member)
     with pytest.raises(OSError, match=r"a\.npz: cannot be read: ") as caught:
         read_arrays(tmp_path / "a.npz", {"density": SHAPE})
     assert "\n" not in str(caught.value)
 
 
-def test_what_is_no_archive_of_ours_is_refused(tmp_path: Path) -> None:
+def test_what_is_no_archive_of_ours_is_refused(tmp_path) -> None:
     path = tmp_path / "a.npz"
     with pytest.raises(FileNotFoundError):
         read_arrays(path, {})
@@ -80,7 +80,7 @@ def test_what_is_no_archive_of_ours_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("kind", [zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
-def test_any_damage_gives_the_arrays_or_an_error(tmp_path: Path, kind: int) -> None:
+def test_any_damage_gives_the_arrays_or_an_error(tmp_path, kind) -> None:
     path = tmp_path / "a.npz"
     zipped(path, saved(DENSITY), kind)
     sound, random = path.read_bytes(), np.random.default_rng(2)
@@ -99,7 +99,7 @@ def test_any_damage_gives_the_arrays_or_an_error(tmp_path: Path, kind: int) -> N
     assert refused > 100
 
 
-def test_an_interrupt_while_writing_is_quiet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_interrupt_while_writing_is_quiet(tmp_path, monkeypatch) -> None:
     """NumPy's own writer leaves an open zip file, which raises a second error when it is collected."""
     cries: list[object] = []
 

@@ -1,28 +1,26 @@
 """What an export leaves out, and that it does not show."""
 
 import json
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from small_sequence import SCENE, SETTINGS, frame, names, needs_vdb, write
+from small_sequence import BURNING, SCENE, SETTINGS, frame, names, needs_vdb, write
 
+from smokelift import Medium, Sequence
 from smokelift.output import export, vdb
 from smokelift.output.export import ExportSettings, export_sequence
 from smokelift.output.host import HOSTS
 from smokelift.output.index import SequenceError
-from smokelift.output.sequence import Sequence
 from smokelift.output.usd import usd_text
 from smokelift.output.writer import SequenceWriter
-from smokelift.scene import Medium
 
 DOMAIN, EXTINCTION = SCENE.domain, SCENE.medium.extinction
 
 
 @pytest.fixture
-def sequence(tmp_path: Path) -> Sequence:
+def sequence(tmp_path) -> Sequence:
     """Smoke in the middle of thin air, without its OpenVDB files where there is no module."""
     with SequenceWriter(tmp_path / "smoke", SCENE, SETTINGS, npz=True) as writer:
         for number in (1, 2, 3):
@@ -41,9 +39,9 @@ def grids(path: Path) -> dict[str, object]:
 
 
 @needs_vdb
-def test_an_export_has_files_with_the_numbers_of_the_sequences(tmp_path: Path) -> None:
-    write(tmp_path / "smoke", [1, 2], start_number=1001)
-    written, out = exported(Sequence.open(tmp_path / "smoke"), tmp_path / "out", proxy=2), tmp_path / "out"
+def test_an_export_has_files_with_the_numbers_of_the_sequences(tmp_path) -> None:
+    out, sequence = tmp_path / "out", write(tmp_path / "smoke", [1, 2], start_number=1001)
+    written = exported(sequence, out, proxy=2)
     frames = [f"{kind}_100{n}.vdb" for kind in ("proxy", "smoke") for n in (1, 2)]
     assert names(out) == sorted([*frames, "export.json", "smoke.usda"])
     assert sum(size for _, size in written) == sum((out / name).stat().st_size for name in frames)
@@ -54,7 +52,7 @@ def test_an_export_has_files_with_the_numbers_of_the_sequences(tmp_path: Path) -
 
 
 @needs_vdb
-def test_thin_air_is_left_out_and_smoke_is_kept(sequence: Sequence, tmp_path: Path) -> None:
+def test_thin_air_is_left_out_and_smoke_is_kept(sequence, tmp_path) -> None:
     exported(sequence, tmp_path / "out")
     rho, u = (vdb.read_grid(tmp_path / "out" / "smoke_0002.vdb", name, DOMAIN) for name in ("density", "velocity"))
     assert not rho[:, :, 6:].any() and not u[:, :, 8:].any()
@@ -63,7 +61,7 @@ def test_thin_air_is_left_out_and_smoke_is_kept(sequence: Sequence, tmp_path: Pa
 
 
 @needs_vdb
-def test_quantized_shows_in_no_picture_of_8_bits(sequence: Sequence, tmp_path: Path) -> None:
+def test_quantized_shows_in_no_picture_of_8_bits(sequence, tmp_path) -> None:
     exported(sequence, tmp_path / "out", precision="quantized")
     rho, u = (vdb.read_grid(tmp_path / "out" / "smoke_0001.vdb", name, DOMAIN) for name in ("density", "velocity"))
     true = sequence.density(1)
@@ -77,7 +75,7 @@ def test_quantized_shows_in_no_picture_of_8_bits(sequence: Sequence, tmp_path: P
 
 
 @needs_vdb
-def test_other_files_are_not_overwritten(sequence: Sequence, tmp_path: Path) -> None:
+def test_other_files_are_not_overwritten(sequence, tmp_path) -> None:
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "holiday.jpg").touch()
     for out in (sequence.directory, tmp_path / "out", tmp_path / "out" / "holiday.jpg"):
@@ -89,13 +87,9 @@ def test_other_files_are_not_overwritten(sequence: Sequence, tmp_path: Path) -> 
 
 @needs_vdb
 @pytest.mark.parametrize("precision", ["half", "quantized"])
-def test_fire_is_exported(tmp_path: Path, precision: str) -> None:
-    burning = replace(SCENE, medium=replace(SCENE.medium, flame_color=(1.0, 0.4, 0.1)))
+def test_fire_is_exported(tmp_path, precision) -> None:
     flame = frame(7)[0]
-    with SequenceWriter(tmp_path / "smoke", burning, SETTINGS, npz=True) as writer:
-        writer.write(1, *frame(1), flame=flame)
-        writer.write(2, *frame(2))
-    exported(Sequence.open(tmp_path / "smoke"), tmp_path / "out", precision=precision)
+    exported(write(tmp_path / "smoke", [1, 2], BURNING, flame), tmp_path / "out", precision=precision)
     np.testing.assert_allclose(vdb.read_grid(tmp_path / "out" / "smoke_0001.vdb", "flame", DOMAIN), flame, atol=4e-3)
     assert set(grids(tmp_path / "out" / "smoke_0002.vdb")) == {"density", "velocity", "flame"}
     assert 'OpenVDBAsset "flame"' in (tmp_path / "out" / "smoke.usda").read_text()
@@ -111,7 +105,7 @@ def placed(path: Path, name: str, axis: int) -> tuple[float, float]:
 
 
 @needs_vdb
-def test_files_for_houdini(sequence: Sequence, tmp_path: Path) -> None:
+def test_files_for_houdini(sequence, tmp_path) -> None:
     exported(sequence, tmp_path / "out", host="houdini", proxy=2)
     path = tmp_path / "out" / "smoke_0002.vdb"
     assert set(grids(path)) == {"density", "vel"}
@@ -131,7 +125,7 @@ def test_files_for_houdini(sequence: Sequence, tmp_path: Path) -> None:
 
 
 @needs_vdb
-def test_files_for_unreal(sequence: Sequence, tmp_path: Path) -> None:
+def test_files_for_unreal(sequence, tmp_path) -> None:
     """Densities are 256 steps up to 1, their extinction is what they were divided by, and the pivot stays in place."""
     exported(sequence, tmp_path / "out", proxy=2)  # which is replaced, all of it
     exported(sequence, tmp_path / "out", host="unreal")

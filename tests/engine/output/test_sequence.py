@@ -2,32 +2,27 @@
 
 import json
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 from small_sequence import SCENE, SETTINGS, frame, names, needs_vdb, write
 
+from smokelift import Sequence, render
 from smokelift.output import vdb
 from smokelift.output.index import SequenceError
-from smokelift.output.sequence import Sequence
 from smokelift.output.writer import SequenceWriter
-from smokelift.render import render
 from smokelift.scene import orbit
 from smokelift.transport import Velocity, on_faces
 
 
 @needs_vdb
-def test_a_sequence_opens_as_it_was_written(tmp_path: Path) -> None:
-    write(tmp_path / "out", [1, 2, 3])
+def test_a_sequence_opens_as_it_was_written(tmp_path) -> None:
+    opened = write(tmp_path / "out", [1, 2, 3])
     assert names(tmp_path / "out") == [
         "sequence.json",
         *(f"smoke_000{n}.{kind}" for n in (1, 2, 3) for kind in ("npz", "vdb")),
     ]
-    opened = Sequence.open(tmp_path / "out")
-    assert opened.scene == SCENE
-    assert opened.settings == SETTINGS
-    assert opened.frames == (1, 2, 3)
+    assert (opened.scene, opened.settings, opened.frames) == (SCENE, SETTINGS, (1, 2, 3))
     assert opened.complete
     assert opened.versions["numpy"] == np.__version__
     rho, faces = frame(2)
@@ -49,9 +44,8 @@ def test_a_sequence_opens_as_it_was_written(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("npz", [True, pytest.param(False, marks=needs_vdb)])
-def test_a_frame_renders_as_its_scene_says(tmp_path: Path, npz: bool) -> None:
-    write(tmp_path, [1, 2], npz=npz)
-    opened = Sequence.open(tmp_path)
+def test_a_frame_renders_as_its_scene_says(tmp_path, npz) -> None:
+    opened = write(tmp_path, [1, 2], npz=npz)
     for camera in (None, orbit(SCENE.camera, SCENE.domain, 30)):
         expected = render(frame(2)[0], SCENE, camera)
         np.testing.assert_allclose(opened.render(2, camera), expected, atol=2e-3 * expected.max())
@@ -59,25 +53,25 @@ def test_a_frame_renders_as_its_scene_says(tmp_path: Path, npz: bool) -> None:
         opened.render(3)
 
 
-def test_figures_are_json(tmp_path: Path, no_vdb: None) -> None:
+def test_figures_are_json(tmp_path, no_vdb) -> None:
     with SequenceWriter(tmp_path, SCENE, SETTINGS, npz=True) as writer:
         figures = {"loss": np.float32(0.5), "psnr": math.inf, "each": np.array([1, 2]), "note": "thin"}
         writer.write(1, *frame(1), figures)
     assert Sequence.open(tmp_path).figures(1) == {"loss": 0.5, "psnr": None, "each": [1, 2], "note": "thin"}
 
 
-def test_what_is_no_sequence_is_named(tmp_path: Path, no_vdb: None) -> None:
+def test_what_is_no_sequence_is_named(tmp_path, no_vdb) -> None:
     with pytest.raises(SequenceError):
         Sequence.open(tmp_path)
-    write(tmp_path, [1])
-    with pytest.raises(SequenceError):
-        Sequence.open(tmp_path).density(2)
-    (tmp_path / "smoke_0001.npz").write_bytes(b"half")
-    with pytest.raises(SequenceError):
-        Sequence.open(tmp_path).density(1)
-    (tmp_path / "smoke_0001.npz").unlink()
-    with pytest.raises(SequenceError):
-        Sequence.open(tmp_path).velocity(1)
+    opened, file = write(tmp_path, [1]), tmp_path / "smoke_0001.npz"
+    for read, number, spoil in (
+        (opened.density, 2, lambda: None),
+        (opened.density, 1, lambda: file.write_bytes(b"half")),
+        (opened.velocity, 1, file.unlink),
+    ):
+        spoil()
+        with pytest.raises(SequenceError):
+            read(number)
     index = json.loads((tmp_path / "sequence.json").read_text())
     corners = {"min": [0, 0, 0], "max": [1, 1, 1]}
     boxes = 7, {"min": [0, 0, 0]}, {**corners, "resolution": [0, 1, 1]}, {**corners, "resolution": [1, 1, 1]}
@@ -103,7 +97,7 @@ def test_what_is_no_sequence_is_named(tmp_path: Path, no_vdb: None) -> None:
 
 
 @pytest.mark.parametrize("kind", ["npz", pytest.param("vdb", marks=needs_vdb)])
-def test_a_file_that_was_changed_is_refused_before_it_is_read(tmp_path: Path, kind: str) -> None:
+def test_a_file_that_was_changed_is_refused_before_it_is_read(tmp_path, kind) -> None:
     write(tmp_path, [1, 2], npz=kind == "npz")
     path = tmp_path / f"smoke_0002.{kind}"
     changed = bytearray(path.read_bytes())

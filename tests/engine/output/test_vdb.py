@@ -3,8 +3,6 @@
 import json
 import subprocess
 import sys
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -26,7 +24,7 @@ def frame() -> tuple[np.ndarray, np.ndarray]:
 
 @needs_vdb
 @pytest.mark.parametrize("order", ["C", "F"])
-def test_a_frame_comes_back(tmp_path: Path, order: Any) -> None:
+def test_a_frame_comes_back(tmp_path, order) -> None:
     density, velocity = frame()
     vdb.write_vdb(tmp_path / "a.vdb", np.asarray(density, order=order), np.asarray(velocity, np.float64, order), DOMAIN)
     rho, u = (vdb.read_grid(tmp_path / "a.vdb", name, DOMAIN) for name in ("density", "velocity"))
@@ -39,7 +37,7 @@ def test_a_frame_comes_back(tmp_path: Path, order: Any) -> None:
 
 
 @needs_vdb
-def test_grids_are_what_blender_expects(tmp_path: Path) -> None:
+def test_grids_are_what_blender_expects(tmp_path) -> None:
     density, velocity = frame()
     vdb.write_vdb(tmp_path / "a.vdb", density, velocity, DOMAIN, {"quality": "draft", "steps": 3})
     grids = {grid.name: grid for grid in vdb.vdb_module().readAll(str(tmp_path / "a.vdb"))[0]}
@@ -56,7 +54,7 @@ def test_grids_are_what_blender_expects(tmp_path: Path) -> None:
 
 
 @needs_vdb
-def test_a_flame_comes_back(tmp_path: Path) -> None:
+def test_a_flame_comes_back(tmp_path) -> None:
     density, velocity = frame()
     flame = np.roll(density, (8, 0, 7), (0, 1, 2))
     vdb.write_vdb(tmp_path / "a.vdb", density, velocity, DOMAIN, flame=flame)
@@ -76,7 +74,7 @@ def test_a_flame_comes_back(tmp_path: Path) -> None:
 
 
 @needs_vdb
-def test_a_velocity_on_faces_is_stored_at_centres(tmp_path: Path) -> None:
+def test_a_velocity_on_faces_is_stored_at_centres(tmp_path) -> None:
     density, _ = frame()
     random = np.random.default_rng(6)
     x, y, z = (random.normal(size=shape).astype(np.float32) for shape in face_shapes(DOMAIN.shape))
@@ -93,7 +91,7 @@ def test_a_velocity_on_faces_is_stored_at_centres(tmp_path: Path) -> None:
 
 
 @needs_vdb
-def test_a_frame_without_smoke_holds_both_grids_empty(tmp_path: Path) -> None:
+def test_a_frame_without_smoke_holds_both_grids_empty(tmp_path) -> None:
     vdb.write_vdb(tmp_path / "a.vdb", np.zeros(DOMAIN.shape), np.ones((*DOMAIN.shape, 3)), DOMAIN)
     grids = vdb.vdb_module().readAll(str(tmp_path / "a.vdb"))[0]
     assert sorted((grid.name, grid.activeVoxelCount()) for grid in grids) == [("density", 0), ("velocity", 0)]
@@ -101,7 +99,7 @@ def test_a_frame_without_smoke_holds_both_grids_empty(tmp_path: Path) -> None:
 
 
 @needs_vdb
-def test_what_cannot_be_written_is_refused_and_leaves_the_old_file(tmp_path: Path) -> None:
+def test_what_cannot_be_written_is_refused_and_leaves_the_old_file(tmp_path) -> None:
     density, velocity = frame()
     path = tmp_path / "a.vdb"
     vdb.write_vdb(path, density, velocity, DOMAIN)

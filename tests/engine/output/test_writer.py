@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from small_sequence import SCENE, SETTINGS, frame, has_vdb, names, write
+from small_sequence import BURNING, SCENE, SETTINGS, frame, has_vdb, names, write
 
 from smokelift.output.archive import VELOCITY
 from smokelift.output.files import PICTURES
@@ -39,7 +39,7 @@ def cut_off(directory: Path, numbers: Iterable[int], *, npz: bool = True, **opti
         raise CutOffError
 
 
-def test_numpy_files_alone_need_no_vdb_module_and_are_not_overwritten(tmp_path: Path, no_vdb: None) -> None:
+def test_numpy_files_alone_need_no_vdb_module_and_are_not_overwritten(tmp_path, no_vdb) -> None:
     write(tmp_path / "out", [1], resume=True)
     before = {file.name: file.read_bytes() for file in (tmp_path / "out").iterdir()}
     assert sorted(before) == ["sequence.json", "smoke_0001.npz"]
@@ -58,7 +58,7 @@ def finished(directory: Path) -> tuple[int, ...]:
 
 
 @pytest.mark.parametrize("renames", [0, 1])
-def test_a_run_that_ends_before_its_first_frame_goes_on(tmp_path: Path, no_vdb: None, monkeypatch, renames) -> None:
+def test_a_run_that_ends_before_its_first_frame_goes_on(tmp_path, no_vdb, monkeypatch, renames) -> None:
     out, background = tmp_path / "out", np.full((48, 32, 3), 0.2, np.float32)
     rename, left = Path.replace, renames
 
@@ -79,36 +79,35 @@ def test_a_run_that_ends_before_its_first_frame_goes_on(tmp_path: Path, no_vdb: 
     assert names(out) == ["background.exr", "sequence.json", "smoke_0001.npz"]
 
 
-def test_choices_and_provenance_are_kept_and_not_compared(tmp_path: Path, no_vdb: None) -> None:
+def test_choices_and_provenance_are_kept_and_not_compared(tmp_path, no_vdb) -> None:
     choices, provenance = [{"what": "scattering", "measured": {"error": math.nan}}], [{"origin": "estimated"}]
     cut_off(tmp_path, [1], choices=choices, provenance=provenance)
     begun = Sequence.open(tmp_path)
     assert begun.choices == ({"what": "scattering", "measured": {"error": None}},)
     assert begun.provenance == tuple(provenance)
     other, assumed = ({"what": "scattering", "measured": {"error": 0.2}},), ({"origin": "assumed"},)
-    write(tmp_path, [2], resume=True, choices=other, provenance=assumed)
-    assert (Sequence.open(tmp_path).choices, Sequence.open(tmp_path).provenance) == (other, assumed)
+    resumed = write(tmp_path, [2], resume=True, choices=other, provenance=assumed)
+    assert (resumed.choices, resumed.provenance) == (other, assumed)
 
 
 @pytest.mark.parametrize("name", ["holiday.jpg", "smoke_0001.vdb", "preview.mp4"])
 @pytest.mark.parametrize("resume", [False, True])
-def test_a_directory_of_other_files_is_refused(tmp_path: Path, no_vdb: None, name: str, resume: bool) -> None:
+def test_a_directory_of_other_files_is_refused(tmp_path, no_vdb, name, resume) -> None:
     (tmp_path / name).write_bytes(b"precious")
     with pytest.raises(SequenceError):
         write(tmp_path, [1], resume=resume)
     assert names(tmp_path) == [name]
 
 
-def test_pictures_of_the_run_and_hidden_files_are_in_nobodys_way(tmp_path: Path, no_vdb: None) -> None:
+def test_pictures_of_the_run_and_hidden_files_are_in_nobodys_way(tmp_path, no_vdb) -> None:
     (tmp_path / ".DS_Store").write_bytes(b"the file manager's")
     cut_off(tmp_path, [1])
     for name in PICTURES:
         (tmp_path / name).write_bytes(b"of frame 1")
-    write(tmp_path, [2], resume=True)
-    assert Sequence.open(tmp_path).frames == (1, 2)
+    assert write(tmp_path, [2], resume=True).frames == (1, 2)
 
 
-def test_a_run_goes_on_where_it_was_cut_off(tmp_path: Path) -> None:
+def test_a_run_goes_on_where_it_was_cut_off(tmp_path) -> None:
     npz = not has_vdb()
     cut_off(tmp_path, [1, 2, 3], npz=npz)
     assert "resume.npz" in names(tmp_path)
@@ -128,11 +127,10 @@ def test_a_run_goes_on_where_it_was_cut_off(tmp_path: Path) -> None:
     assert Sequence.open(tmp_path).frames == (1, 2, 3, 4)
 
 
-def test_files_are_numbered_from_another_start_and_frames_are_not(tmp_path: Path, no_vdb: None) -> None:
+def test_files_are_numbered_from_another_start_and_frames_are_not(tmp_path, no_vdb) -> None:
     cut_off(tmp_path, [1, 2], start_number=1001)
-    write(tmp_path, [3], resume=True, start_number=1001)
+    sequence = write(tmp_path, [3], resume=True, start_number=1001)
     assert names(tmp_path) == ["sequence.json", *(f"smoke_{n}.npz" for n in (1001, 1002, 1003))]
-    sequence = Sequence.open(tmp_path)
     assert (sequence.frames, sequence.start_number, sequence.file_number(3)) == ((1, 2, 3), 1001, 1003)
     for number in sequence.frames:
         np.testing.assert_array_equal(sequence.density(number), frame(number)[0])
@@ -146,7 +144,7 @@ def test_files_are_numbered_from_another_start_and_frames_are_not(tmp_path: Path
     assert Sequence.open(tmp_path).start_number == 1
 
 
-def test_a_frame_without_its_state_is_made_again(tmp_path: Path, no_vdb: None) -> None:
+def test_a_frame_without_its_state_is_made_again(tmp_path, no_vdb) -> None:
     cut_off(tmp_path, [1, 2])
     older = (tmp_path / "resume.npz").read_bytes()
     (tmp_path / ".smoke_0003.npz.77.tmp").write_bytes(b"half a fra")
@@ -157,7 +155,6 @@ def test_a_frame_without_its_state_is_made_again(tmp_path: Path, no_vdb: None) -
     (tmp_path / "resume.npz").write_bytes(older)
     with SequenceWriter(tmp_path, SCENE, SETTINGS, npz=True, resume=True) as writer:
         assert writer.finished == (1, 2)
-        assert writer.state is not None
         assert writer.state.number == 2
         writer.write(3, *frame(3))
     assert Sequence.open(tmp_path).frames == (1, 2, 3)
@@ -173,7 +170,7 @@ def test_a_frame_without_its_state_is_made_again(tmp_path: Path, no_vdb: None) -
         ({"start_number": 2}, "start_number"),
     ],
 )
-def test_another_run_is_not_resumed(tmp_path: Path, no_vdb: None, change: dict[str, Any], words: str) -> None:
+def test_another_run_is_not_resumed(tmp_path, no_vdb, change, words) -> None:
     run: dict[str, Any] = {"scene": SCENE, "settings": SETTINGS, "sources": {"clip": {"bytes": 9, "sha256": "ab"}}}
     with pytest.raises(CutOffError), SequenceWriter(tmp_path, **run, npz=True) as writer:
         writer.write(1, *frame(1))
@@ -184,7 +181,7 @@ def test_another_run_is_not_resumed(tmp_path: Path, no_vdb: None, change: dict[s
         assert writer.finished == (1,)
 
 
-def test_another_version_of_what_computes_is_not_resumed(tmp_path: Path, no_vdb: None) -> None:
+def test_another_version_of_what_computes_is_not_resumed(tmp_path, no_vdb) -> None:
     """A patch of Python computes the same."""
     cut_off(tmp_path, [1])
     index = json.loads((tmp_path / "sequence.json").read_text())
@@ -215,7 +212,7 @@ def test_another_version_of_what_computes_is_not_resumed(tmp_path: Path, no_vdb:
         {"extra_smooth": np.full(768, np.nan, np.float32)},
     ],
 )
-def test_a_damaged_state_or_a_lost_frame_is_not_resumed(tmp_path: Path, no_vdb: None, change: Any) -> None:
+def test_a_damaged_state_or_a_lost_frame_is_not_resumed(tmp_path, no_vdb, change) -> None:
     cut_off(tmp_path, [1])
     if change is None:
         (tmp_path / "smoke_0001.npz").unlink()
@@ -229,9 +226,7 @@ def test_a_damaged_state_or_a_lost_frame_is_not_resumed(tmp_path: Path, no_vdb: 
         write(tmp_path, [2], resume=True)
 
 
-def test_files_reach_the_disk_before_they_get_their_names(
-    tmp_path: Path, no_vdb: None, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_files_reach_the_disk_before_they_get_their_names(tmp_path, no_vdb, monkeypatch) -> None:
     synced: set[int] = set()
     sync, rename = os.fsync, Path.replace
 
@@ -250,7 +245,7 @@ def test_files_reach_the_disk_before_they_get_their_names(
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs POSIX signals")
-def test_a_killed_run_leaves_frames_and_no_lock(tmp_path: Path) -> None:
+def test_a_killed_run_leaves_frames_and_no_lock(tmp_path) -> None:
     code = f"""
 import sys, time
 sys.path.insert(0, {str(Path(__file__).parent)!r})
@@ -261,7 +256,6 @@ with SequenceWriter({str(tmp_path / "out")!r}, SCENE, SETTINGS, npz=True) as wri
     time.sleep(60)
 """
     with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as run:
-        assert run.stdout is not None
         assert any(line == "written\n" for line in run.stdout)
         for resume in (False, True):
             with pytest.raises(SequenceError):
@@ -272,9 +266,7 @@ with SequenceWriter({str(tmp_path / "out")!r}, SCENE, SETTINGS, npz=True) as wri
 
 
 @pytest.mark.parametrize("kind", ["writer.write_arrays", "index.Index.write", "resume.ResumeState.write"])
-def test_a_full_disk_counts_the_frames_that_stay(
-    tmp_path: Path, no_vdb: None, monkeypatch: pytest.MonkeyPatch, kind: str
-) -> None:
+def test_a_full_disk_counts_the_frames_that_stay(tmp_path, no_vdb, monkeypatch, kind) -> None:
     def full(*arguments: Any) -> None:
         raise OSError(28, "No space left on device")
 
@@ -289,7 +281,7 @@ def test_a_full_disk_counts_the_frames_that_stay(
     assert finished(tmp_path) == (1,)
 
 
-def test_frames_must_fit_and_follow(tmp_path: Path, no_vdb: None) -> None:
+def test_frames_must_fit_and_follow(tmp_path, no_vdb) -> None:
     rho, (x, y, z) = frame(1)
     with SequenceWriter(tmp_path, SCENE, SETTINGS, npz=True) as writer:
         writer.write(5, rho, (x, y, z))
@@ -307,9 +299,9 @@ def test_frames_must_fit_and_follow(tmp_path: Path, no_vdb: None) -> None:
     assert Sequence.open(tmp_path).frames == (5,)
 
 
-def test_a_flame_is_kept_and_read(tmp_path: Path, no_vdb: None) -> None:
-    burning, flame = replace(SCENE, medium=replace(SCENE.medium, flame_color=(1.0, 0.4, 0.1))), frame(5)[0]
-    with SequenceWriter(tmp_path, burning, SETTINGS, npz=True) as writer:
+def test_a_flame_is_kept_and_read(tmp_path, no_vdb) -> None:
+    flame = frame(5)[0]
+    with SequenceWriter(tmp_path, BURNING, SETTINGS, npz=True) as writer:
         writer.write(1, *frame(1), flame=flame)
         writer.write(2, *frame(2))
         for bad in (flame[1:], -flame, flame * np.nan):

@@ -2,7 +2,6 @@
 
 import errno
 import os
-from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
@@ -20,9 +19,7 @@ def test_eight_bit_is_srgb() -> None:
 
 
 @pytest.mark.parametrize("number", [errno.ENOSPC, errno.EIO])
-def test_a_picture_that_does_not_fit_is_an_error_of_the_system(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int
-) -> None:
+def test_a_picture_that_does_not_fit_is_an_error_of_the_system(tmp_path, monkeypatch, number) -> None:
     def full(*_: Any) -> NoReturn:
         raise RuntimeError(f'Failed to write pixel data to image file "x". {os.strerror(number)}.')
 

@@ -6,13 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from smokelift import Clip, Reconstruction, Scene, reconstruct, render
+from smokelift import Clip, ClipSource, Reconstruction, Scene, Shot, prepare_shot, reconstruct, render
 from smokelift.extraction.matte import matte
 from smokelift.pipeline import compose
 from smokelift.pipeline.clip_fit import beside_clip, clip_psnr
-from smokelift.scene import ClipSource
-from smokelift.setup.prepare import prepare_shot
-from smokelift.setup.shot import Shot
 from tests.engine.conftest import Plume
 from tests.engine.films import clip_of
 

@@ -10,36 +10,30 @@ import numpy as np
 import pytest
 from threadpoolctl import ThreadpoolController, threadpool_limits
 
+from smokelift import Clip, Sequence, Settings, Velocity, prepare_shot
 from smokelift.baselines.density import FixedRateDescent
 from smokelift.density import GradientFit, Start, ViewSet
 from smokelift.density.hull import project_voxels
 from smokelift.evaluation.metrics import psnr
-from smokelift.footage.clip import Clip
 from smokelift.footage.images import read_image
 from smokelift.output.images import write_image
 from smokelift.output.index import SequenceError
-from smokelift.output.sequence import Sequence
 from smokelift.pipeline import Frame, Method, Reconstruction, compose, reconstruct
 from smokelift.pipeline.reconstruction import sources
 from smokelift.render import render, scene_renderer
 from smokelift.scene import Background, ClipSource, DirectionalLight, Inlet, Scene, completed, look_at_matrix
-from smokelift.setup.prepare import prepare_shot
-from smokelift.setup.settings import Settings
-from smokelift.transport import Velocity
 from smokelift.velocity import CoarseToFine, DensityPair
 from tests.engine.setup.shots import burning
 
 
 def frames_of(scene: Scene, settings: Settings, method: Method | None = None, count: int | None = None) -> list[Frame]:
     """The frames of a run, or the first of them."""
-    assert scene.clip is not None
     with Clip.open(scene.clip) as clip:
         return list(islice(reconstruct(clip, scene, settings, method=method), count))
 
 
 def frames_written(scene: Scene, settings: Settings, out: Path, resume: bool = False) -> list[Frame]:
     """The frames that a run writes."""
-    assert scene.clip is not None
     frames: list[Frame] = []
     with Clip.open(scene.clip) as clip:
         reconstruct(clip, scene, settings).write(out, npz=True, resume=resume, on_frame=frames.append)
@@ -53,7 +47,6 @@ def cut_off(scene: Scene, settings: Settings, out: Path, count: int) -> None:
         if frame.number == count:
             raise KeyboardInterrupt
 
-    assert scene.clip is not None
     with Clip.open(scene.clip) as clip, pytest.raises(KeyboardInterrupt):
         reconstruct(clip, scene, settings).write(out, npz=True, on_frame=cancel)
 
@@ -223,7 +216,6 @@ def test_frames_that_are_the_background_are_kept_as_its_picture(plume, draft, tm
 
 def centroid(density: np.ndarray, scene: Scene) -> np.ndarray:
     """Where the smoke is, in meters."""
-    assert scene.domain is not None
     places = np.broadcast_arrays(*scene.domain.offsets((0, 0, 0)))
     return np.array([np.average(place, weights=density) for place in places])
 

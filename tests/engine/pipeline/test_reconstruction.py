@@ -6,12 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from smokelift import render
+from smokelift import Clip, Sequence, render
 from smokelift.density import GradientFit, NothingCarried, ViewSet
-from smokelift.footage.clip import Clip
 from smokelift.output.images import write_image
 from smokelift.output.index import SequenceError
-from smokelift.output.sequence import Sequence
 from smokelift.pipeline import Frame, Reconstruction, compose, reconstruct
 from smokelift.scene import Background, completed
 

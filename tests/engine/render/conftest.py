@@ -1,7 +1,5 @@
 """Fixtures of the renderer's tests."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -10,7 +8,7 @@ from smokelift.scene import EnvironmentLight
 
 
 @pytest.fixture
-def light_of(tmp_path: Path):
+def light_of(tmp_path):
     """Write a picture and make an environment light of it."""
 
     def write(radiance: np.ndarray, **options: float) -> EnvironmentLight:

@@ -7,9 +7,8 @@ import sys
 import numpy as np
 import pytest
 
-from smokelift import render_gradient
+from smokelift import Camera, DirectionalLight, Domain, Medium, Scene, render_gradient
 from smokelift.render import DeviceError, device
-from smokelift.scene import Camera, DirectionalLight, Domain, Medium, Scene
 
 SCENE = Scene(
     camera=Camera.look_at((1.0, -4.0, 2.0), (0.0, 0.0, 0.5), fov_y_degrees=30, size=(24, 32)),

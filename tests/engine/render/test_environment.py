@@ -1,7 +1,5 @@
 """Environment pictures as parallel lights: nothing lost, the right way round, the same on every machine."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -22,7 +20,7 @@ def towards(lights) -> np.ndarray:
 @pytest.mark.parametrize(
     ("size", "count"), [((64, 128), 64), ((5, 7), 2), ((37, 50), 7), ((300, 1100), 2), ((1, 1), 1)]
 )
-def test_no_light_is_lost_or_made(light_of, size: tuple[int, int], count: int) -> None:
+def test_no_light_is_lost_or_made(light_of, size, count) -> None:
     radiance = np.random.default_rng(0).random((*size, 3)) ** 4
     lights = environment_lights(light_of(radiance, strength=2.5), count)
     _, solid_angle = texels(*size)
@@ -32,7 +30,7 @@ def test_no_light_is_lost_or_made(light_of, size: tuple[int, int], count: int) -
 
 
 @pytest.mark.parametrize(("row", "column"), [(0, 0), (0, 40), (9, 3), (16, 32), (20, 63), (31, 17)])
-def test_a_lamp_shines_from_its_texel(light_of, row: int, column: int) -> None:
+def test_a_lamp_shines_from_its_texel(light_of, row, column) -> None:
     """Row 0 is the zenith; u grows clockwise seen from above, and +X is in the middle.
 
     At a pole a texel is a slice of a cap, whose centroid lies off its middle.
@@ -51,7 +49,7 @@ def test_a_lamp_shines_from_its_texel(light_of, row: int, column: int) -> None:
     ("degrees", "expected"),
     [(0, (0.943, 0.0, 0.333)), (90, (0.0, -0.943, 0.333)), (37, (0.753, -0.568, 0.332)), (-450, (0.0, 0.943, 0.333))],
 )
-def test_rotation_turns_the_surroundings_as_blenders_mapping(light_of, degrees: float, expected) -> None:
+def test_rotation_turns_the_surroundings_as_blenders_mapping(light_of, degrees, expected) -> None:
     """The expected directions are what Cycles 4.5 shows of this picture behind a Mapping node, the last by symmetry."""
     radiance = np.zeros((64, 128, 3))
     radiance[20:30, 60:68] = 1.0
@@ -99,7 +97,7 @@ def test_smooth_sums_over_the_sphere_converge(light_of) -> None:
 
 
 @pytest.mark.parametrize("value", [np.nan, -1.0])
-def test_values_that_are_not_finite_are_refused_and_negative_ones_black(light_of, tmp_path: Path, value: float) -> None:
+def test_values_that_are_not_finite_are_refused_and_negative_ones_black(light_of, tmp_path, value) -> None:
     import OpenEXR
 
     radiance = np.random.default_rng(3).random((8, 16, 3)).astype(np.float32)

@@ -7,14 +7,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from smokelift import Clip, Settings, Shot
 from smokelift.checks import Finding
-from smokelift.footage.clip import Clip
 from smokelift.output.images import write_image
 from smokelift.report.result import expected_shortcomings, made_up, provenance, shortcomings
 from smokelift.report.views import choices, part, sentence
 from smokelift.scene import orbit
-from smokelift.setup.settings import Settings
-from smokelift.setup.shot import Shot
 from tests.engine.setup.shots import shot_of
 
 
@@ -86,7 +84,7 @@ def test_what_is_assumed_depends_on_cameras_and_method(shot) -> None:
 @pytest.mark.parametrize(
     ("left", "kind"), [(0.2, None), (0.3, None), (0.4, "not all is smoke"), (0.8, "hardly any smoke fitted")]
 )
-def test_a_fit_that_explains_little_is_said(left: float, kind: str | None) -> None:
+def test_a_fit_that_explains_little_is_said(left, kind) -> None:
     errors = ({"relative_error": left}, {"relative_error": left}, {"relative_error": 0.9}, {})
     figures = [{"hull_share": 0.1, **figures} for figures in errors]
     assert shortcomings(figures) == ([Finding(kind, {"error": left}, doubt=True)] if kind else [])
@@ -96,7 +94,7 @@ def test_a_fit_that_explains_little_is_said(left: float, kind: str | None) -> No
 
 
 @pytest.mark.parametrize(("left", "said"), [(0.2, False), (0.3, True)])
-def test_what_may_be_no_smoke_is_foreseen(left: float, said: bool) -> None:
+def test_what_may_be_no_smoke_is_foreseen(left, said) -> None:
     found = Finding("compared scattering", {"error": left}, about="scattering", value="single", source="measured")
     shot = SimpleNamespace(fire=None, findings=(Finding("open box"), found))
     assert expected_shortcomings(shot) == (

@@ -31,7 +31,7 @@ all_three = pytest.mark.parametrize(
         np.full((4, 4), np.nan),
     ],
 )
-def test_only_rigid_matrices_are_cameras(rows: np.ndarray) -> None:
+def test_only_rigid_matrices_are_cameras(rows) -> None:
     with pytest.raises(SceneError, match="matrix"):
         Camera("perspective", rows, (4, 4), 1.0, 1.0, 2.0, 2.0)  # type: ignore[arg-type]
 
@@ -78,7 +78,7 @@ def test_a_moving_camera_stands_still_in_every_frame() -> None:
 
 @all_three
 @pytest.mark.parametrize(("yaw", "pitch"), [(33, 0), (0, 25), (-120, -10)])
-def test_an_orbit_keeps_distance_and_aim(camera: Camera, yaw: float, pitch: float) -> None:
+def test_an_orbit_keeps_distance_and_aim(camera, yaw, pitch) -> None:
     moved = orbit(camera, DOMAIN, yaw, pitch)
     distance = [np.linalg.norm(np.array(c.position) - CENTER) for c in (camera, moved)]
     assert distance[1] == pytest.approx(distance[0])
@@ -88,7 +88,7 @@ def test_an_orbit_keeps_distance_and_aim(camera: Camera, yaw: float, pitch: floa
 
 
 @both
-def test_ninety_degrees_look_from_the_right_side(camera: Camera) -> None:
+def test_ninety_degrees_look_from_the_right_side(camera) -> None:
     side = orbit(camera, DOMAIN, 90)
     np.testing.assert_allclose(side.position, (4, 0, 0.8), atol=1e-12)
     matrix = np.array(side.matrix)
@@ -97,7 +97,7 @@ def test_ninety_degrees_look_from_the_right_side(camera: Camera) -> None:
 
 
 @all_three
-def test_pitch_raises_the_camera(camera: Camera) -> None:
+def test_pitch_raises_the_camera(camera) -> None:
     x, y, z = np.array(camera.position) - CENTER
     elevation = np.degrees(np.arctan2(z, np.hypot(x, y)))
     for pitch in (20.0, -20.0):

@@ -2,25 +2,13 @@
 
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from scene_examples import GOOD, load, moving_camera
 
-from smokelift.scene import (
-    Background,
-    Box,
-    Camera,
-    Domain,
-    Inlet,
-    Medium,
-    Scene,
-    SceneError,
-    completed,
-    scene_from_dict,
-    scene_to_dict,
-)
+from smokelift import Background, Camera, Domain, Medium, Scene
+from smokelift.scene import Box, Inlet, SceneError, completed, scene_from_dict, scene_to_dict
 from smokelift.scene.domain import box_around
 
 
@@ -49,7 +37,7 @@ def test_the_box_around_marked_voxels_ends_at_the_grid() -> None:
     assert box_around(marked, 2) == (slice(2, 8), slice(0, 6), slice(3, 7))
 
 
-def test_inlets_add_up(tmp_path: Path) -> None:
+def test_inlets_add_up(tmp_path) -> None:
     scene = completed(load(tmp_path, GOOD))
     inlets = Inlet((0, 0, 0), 0.2), Inlet((0.5, 0.5, 1), 0.1)
     expected = inlets[0].voxels(scene.domain) | inlets[1].voxels(scene.domain)
@@ -57,7 +45,7 @@ def test_inlets_add_up(tmp_path: Path) -> None:
     assert scene.inflow() is None
 
 
-def test_what_is_missing_takes_a_default_but_camera_and_domain(tmp_path: Path) -> None:
+def test_what_is_missing_takes_a_default_but_camera_and_domain(tmp_path) -> None:
     described = load(tmp_path, GOOD)
     bare = Scene(camera=described.camera, domain=described.domain)
     scene = completed(bare)
@@ -76,7 +64,7 @@ def test_what_is_missing_takes_a_default_but_camera_and_domain(tmp_path: Path) -
         replace(scene, background=None)
 
 
-def test_further_views_keep_step_with_another_range(tmp_path: Path) -> None:
+def test_further_views_keep_step_with_another_range(tmp_path) -> None:
     """Frames that were said to belong to the clip's move with them; those that were not have the same numbers."""
     scene = load(tmp_path, GOOD)
     (view,) = scene.views

@@ -8,24 +8,14 @@ import numpy as np
 import pytest
 from scene_examples import FRONT, GOOD, load
 
-from smokelift.scene import (
-    Background,
-    ClipSource,
-    DirectionalLight,
-    Domain,
-    Medium,
-    PointLight,
-    Scene,
-    SceneError,
-)
+from smokelift.scene import Background, ClipSource, DirectionalLight, Domain, Medium, PointLight, Scene, SceneError
 
 AIMED = "position = [0, -7, 1.5]\ntarget = [0, 0, 1.5]"
 
 
-def test_every_table_is_read(tmp_path: Path) -> None:
+def test_every_table_is_read(tmp_path) -> None:
     scene = load(tmp_path, GOOD)
     assert scene.clip == ClipSource(tmp_path / "smoke.mp4", 24.0, (0, 10))
-    assert scene.camera is not None
     np.testing.assert_allclose(scene.camera.matrix, FRONT, atol=1e-12)
     assert scene.camera.fx == scene.camera.fy == pytest.approx(192 / math.tan(math.radians(15)))
     assert (scene.camera.cx, scene.camera.cy) == (128, 192)
@@ -141,7 +131,7 @@ def test_every_table_is_read(tmp_path: Path) -> None:
         ("", "[domain]\nmin = [0, 0, 0]\nmax = [1, 1, 0]\n", "max must be above min"),
     ],
 )
-def test_what_is_wrong_is_named_with_its_line(tmp_path: Path, old: str, new: str, message: str) -> None:
+def test_what_is_wrong_is_named_with_its_line(tmp_path, old, new, message) -> None:
     text = GOOD.replace(old, new, 1) if old else new
     assert text != GOOD
     with pytest.raises(SceneError) as caught:
@@ -150,7 +140,7 @@ def test_what_is_wrong_is_named_with_its_line(tmp_path: Path, old: str, new: str
     assert "\n" not in str(caught.value)
 
 
-def test_what_cannot_be_read_is_named_and_not_waited_for(tmp_path: Path) -> None:
+def test_what_cannot_be_read_is_named_and_not_waited_for(tmp_path) -> None:
     binary, pipe, large = (tmp_path / f"{name}.toml" for name in ("binary", "pipe", "large"))
     binary.write_bytes(b"\xff\xfe\x00")
     os.mkfifo(pipe)

@@ -7,22 +7,8 @@ import numpy as np
 import pytest
 from scene_examples import FRONT, moving_camera
 
-from smokelift.scene import (
-    Background,
-    Box,
-    Camera,
-    ClipSource,
-    DirectionalLight,
-    Domain,
-    EnvironmentLight,
-    Inlet,
-    Medium,
-    PointLight,
-    Scene,
-    View,
-    scene_from_dict,
-    scene_to_dict,
-)
+from smokelift import Background, Camera, ClipSource, DirectionalLight, Domain, EnvironmentLight, Medium, Scene
+from smokelift.scene import Box, Inlet, PointLight, View, scene_from_dict, scene_to_dict
 
 CLIP = ClipSource(Path('/footage/a "b" \n ü/smoke_####.png'), 1e-6, (9, 10), "linear", Path("/footage/mask.png"))
 DOMAIN = Domain((-0.1, 1 / 3, -1e-12), (0.9, 4 / 3, 2.0), (5, 5, 10))
@@ -55,13 +41,13 @@ SCENES = {
 
 
 @pytest.mark.parametrize("scene", SCENES.values(), ids=SCENES.keys())
-def test_a_scene_comes_back_as_it_was_saved(tmp_path: Path, scene: Scene) -> None:
+def test_a_scene_comes_back_as_it_was_saved(tmp_path, scene) -> None:
     scene.save(tmp_path / "scene.toml")
     assert Scene.load(tmp_path / "scene.toml") == scene
     assert scene_from_dict(scene_to_dict(scene)) == scene
 
 
-def test_any_rotation_and_number_comes_back(tmp_path: Path) -> None:
+def test_any_rotation_and_number_comes_back(tmp_path) -> None:
     random = np.random.default_rng(1)
     for n in range(20):
         matrix = np.eye(4)
@@ -75,7 +61,7 @@ def test_any_rotation_and_number_comes_back(tmp_path: Path) -> None:
         assert Scene.load(tmp_path / f"{n}.toml") == scene
 
 
-def test_paths_move_with_the_scene_file(tmp_path: Path) -> None:
+def test_paths_move_with_the_scene_file(tmp_path) -> None:
     old, new = tmp_path / "old", tmp_path / "new"
     old.mkdir()
     Scene(

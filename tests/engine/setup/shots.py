@@ -2,25 +2,19 @@
 
 import numpy as np
 
-from smokelift.footage.clip import Clip
-from smokelift.scene import Scene
+from smokelift import Clip, Scene, Settings, Shot, prepare_shot
 from smokelift.setup.first_estimate import first_estimate
 from smokelift.setup.geometry import Geometry, find_geometry
-from smokelift.setup.prepare import prepare_shot
-from smokelift.setup.settings import Settings
-from smokelift.setup.shot import Shot
 
 
 def shot_of(scene: Scene, settings: Settings) -> Shot:
     """Everything decided about a scene from its clip."""
-    assert scene.clip is not None
     with Clip.open(scene.clip) as clip:
         return prepare_shot(clip, scene, settings)
 
 
 def geometry_of(scene: Scene, settings: Settings) -> Geometry:
     """Camera, box and resolution of a scene from its clip."""
-    assert scene.clip is not None
     with Clip.open(scene.clip) as clip:
         return find_geometry(scene, first_estimate(clip, scene.camera, scene.background), settings)
 

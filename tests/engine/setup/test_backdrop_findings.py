@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
+from smokelift import Background, Clip
 from smokelift.checks import Finding
 from smokelift.extraction.backdrop import Backdrop, find_backdrop
 from smokelift.extraction.matte import matte
 from smokelift.extraction.strokes import Strokes
-from smokelift.footage.clip import Clip
 from smokelift.footage.images import blurred
 from smokelift.output.images import write_image
-from smokelift.scene import Background
 from smokelift.setup.backdrop_findings import backdrop_findings, doubts, first_findings
 from smokelift.setup.first_estimate import SmokeSamples, first_estimate, sample_smoke
 from tests.engine.films import clear_plate, clip_of, coded, film, puff, wall
@@ -180,10 +179,7 @@ def test_a_mask_that_hides_all_smoke_is_said(tmp_path, plate, inverted, smoke) -
     """A mask over smoke on the left half, one over the other half, and this one where there is no smoke at all."""
     left = np.arange(56) < 28
 
-    def opacity(n: int) -> np.ndarray:
-        return np.roll(puff(n), -14, axis=1) * left * smoke
-
-    clip = film(tmp_path, plate, opacity, 0.6)
+    clip = film(tmp_path, plate, lambda n: np.roll(puff(n), -14, axis=1) * left * smoke, 0.6)
     write_image(tmp_path / "mask.png", np.broadcast_to((left != inverted)[None, :, None], (72, 56, 3)).astype(float))
     with Clip.open(clip.path, fps=24, mask=tmp_path / "mask.png") as masked:
         said = [remark.kind for remark in first_findings(first_estimate(masked, None, None), given=False)]

@@ -5,11 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from smokelift.footage.clip import Clip
+from smokelift import Background, Clip, DirectionalLight, Medium, prepare_shot
 from smokelift.output.images import write_image
-from smokelift.scene import Background, DirectionalLight, Medium
 from smokelift.setup.first_estimate import first_estimate
-from smokelift.setup.prepare import prepare_shot
 from tests.engine.setup.shots import burning
 
 

@@ -6,13 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from smokelift import render
-from smokelift.footage.clip import Clip
+from smokelift import Clip, Settings, Shot, prepare_shot, render
 from smokelift.output.images import write_image
 from smokelift.scene import Background, ClipSource, Scene, View, completed, look_at_matrix, orbit
-from smokelift.setup.prepare import prepare_shot
-from smokelift.setup.settings import Settings
-from smokelift.setup.shot import Shot
 from tests.engine.setup.shots import shot_of
 
 

@@ -8,16 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from smokelift import Background, Clip, DirectionalLight, EnvironmentLight, Medium, Scene, Shot, prepare_shot
 from smokelift.checks import Finding
-from smokelift.footage.clip import Clip
 from smokelift.footage.noise import lasting_noise
 from smokelift.output.images import write_image
-from smokelift.scene import Background, DirectionalLight, EnvironmentLight, Medium, Scene
 from smokelift.setup import illumination
 from smokelift.setup.coarse import HeldOut
 from smokelift.setup.illumination import light_doubts
-from smokelift.setup.prepare import prepare_shot
-from smokelift.setup.shot import Shot
 from tests.engine.conftest import Plume
 from tests.engine.setup.shots import shot_of
 
@@ -40,42 +37,32 @@ def test_the_light_before_one_color_is_as_strong_as_the_thickest_smoke_asks(plum
         assert low * thickest < source.max() < high * thickest
 
 
-@pytest.mark.parametrize("tint", [(1.0, 1.0, 1.0), (1.2, 1.0, 0.75)], ids=["white", "warm"])
-def test_before_a_picture_the_light_is_as_strong_as_the_smoke_hides(plume, draft, tmp_path, tint) -> None:
-    """Thin smoke, which before one color looks as if it stood in fainter light; and the light's color is its own."""
-    detail = np.kron(np.random.default_rng(1).random((14, 10)), np.ones((4, 4)))[..., None]
-    write_image(tmp_path / "wall.png", (0.02 + 0.4 * detail * (1.0, 0.8, 0.6)).astype("f4"))
-    haze = replace(
-        plume.scene,
-        medium=Medium(1.5, 0.9),
-        lights=(DirectionalLight((0.3, 0.5, -0.8), tuple(9.0 * channel for channel in tint)),),
-        background=Background(image=tmp_path / "wall.png"),
-    )
-    scene = plume.write(tmp_path / "clip", plume.densities, haze)
-    shot = shot_of(replace(scene, lights=()), draft)
-    true = 0.9 / (4 * np.pi) * 9.0 * np.array(tint)  # without the little that the haze shades itself
+DETAIL = np.kron(np.random.default_rng(1).random((14, 10)), np.ones((4, 4)))[..., None] * (1.0, 0.8, 0.6)
+GREEN = np.repeat(np.linspace((0.5, 0.7, 0.3), (0.4, 0.55, 0.22), 56, dtype=np.float32)[:, None], 40, axis=1)
+
+
+@pytest.mark.parametrize(
+    ("wall", "light"),
+    [(0.02 + 0.4 * DETAIL, (9.0, 9.0, 9.0)), (0.02 + 0.4 * DETAIL, (10.8, 9.0, 6.75)), (GREEN, (4.0, 4.0, 4.0))],
+    ids=["white", "warm", "smooth, of another hue"],
+)
+def test_before_a_picture_the_light_is_as_strong_as_the_smoke_hides(plume, draft, tmp_path, wall, light) -> None:
+    """Thin smoke, which before one color looks as if it stood in fainter light, and through which a bright wall shows;
+    the light's color is its own."""
+    write_image(tmp_path / "wall.png", wall.astype("f4"))
+    behind, lights = Background(image=tmp_path / "wall.png"), (DirectionalLight((0.3, 0.5, -0.8), light),)
+    haze = replace(plume.scene, medium=Medium(1.5, 0.9), lights=lights, background=behind)
+    shot = shot_of(replace(plume.write(tmp_path / "clip", plume.densities, haze), lights=()), draft)
+    true = 0.9 / (4 * np.pi) * np.array(light)  # without the little that the haze shades itself
     found = chosen(shot, "source radiance")
     assert found.source == "measured"
     assert [found.figures[name] for name in ("red", "green", "blue")] == pytest.approx(true, rel=0.3)
     assert shot.optics.unshadowed_source() == pytest.approx(shot.views[0].source, rel=1e-4)
 
 
-def test_before_a_smooth_wall_of_another_hue_the_light_is_as_strong_as_the_smoke_hides(plume, draft, tmp_path) -> None:
-    """Its brightest pixels are the wall's, through thin smoke."""
-    green = np.linspace((0.5, 0.7, 0.3), (0.4, 0.55, 0.22), 56, dtype=np.float32)
-    write_image(tmp_path / "wall.png", np.repeat(green[:, None], 40, axis=1))
-    behind = Background(image=tmp_path / "wall.png")
-    lights = (DirectionalLight((0.3, 0.5, -0.8), (4.0, 4.0, 4.0)),)
-    haze = replace(plume.scene, medium=Medium(1.5, 0.9), lights=lights, background=behind)
-    scene = plume.write(tmp_path / "clip", plume.densities, haze)
-    shot = shot_of(replace(scene, lights=()), draft)
-    assert shot.optics.unshadowed_source() == pytest.approx(0.9 / (4 * np.pi) * np.full(3, 4.0), rel=0.3)
-
-
 def test_a_given_light_has_the_white_balance_of_a_clip_in_which_that_changes(plume, draft, tmp_path) -> None:
     """Before a plate that was found in it: that is as red as the clip's middle, and so is the smoke before it."""
-    detail = np.kron(np.random.default_rng(1).random((14, 10)), np.ones((4, 4)))[..., None]
-    write_image(tmp_path / "wall.png", (0.05 + 0.2 * detail * (1.0, 0.8, 0.6)).astype("f4"))
+    write_image(tmp_path / "wall.png", (0.05 + 0.2 * DETAIL).astype("f4"))
     before = replace(plume.scene, background=Background(image=tmp_path / "wall.png"))
     passing = [plume.blob(plume.scene, height) for height in np.linspace(-0.3, 1.9, 14)]
     scene = replace(plume.write(tmp_path / "clip", passing, before), background=None)

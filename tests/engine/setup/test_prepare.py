@@ -6,28 +6,17 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from smokelift import Clip, Shot
 from smokelift.checks import UNDETERMINED, Finding
-from smokelift.density.upright_plane import AxisEstimate, Cue, SmokeAxis, view_frame
-from smokelift.footage.clip import Clip
+from smokelift.density.upright_plane import AxisEstimate, SmokeAxis, view_frame
 from smokelift.footage.images import read_image
 from smokelift.output.images import write_image
-from smokelift.scene import (
-    Background,
-    Camera,
-    ClipSource,
-    Domain,
-    Inlet,
-    Scene,
-    as_matrix,
-    completed,
-    look_at_matrix,
-)
+from smokelift.scene import Background, Camera, ClipSource, Domain, Inlet, Scene, as_matrix, completed, look_at_matrix
 from smokelift.scene.projection import project_points
 from smokelift.setup.first_estimate import first_estimate
 from smokelift.setup.geometry import MIN_SIDE_VOXELS, Geometry, find_geometry
 from smokelift.setup.prepare import found_place, velocity_coarsening
 from smokelift.setup.settings import LIMITS, Settings
-from smokelift.setup.shot import Shot
 from tests.engine.setup.shots import geometry_of, shot_of
 
 SIZE = (40, 56)
@@ -103,7 +92,7 @@ def test_the_domain_holds_the_smoke(estimated, passing, draft) -> None:
 
 
 @pytest.mark.parametrize("tilt", [17, -25])
-def test_a_box_is_found_for_a_camera_that_is_given(plume, draft, tilt: float) -> None:
+def test_a_box_is_found_for_a_camera_that_is_given(plume, draft, tilt) -> None:
     """It stands upright before the camera, around what the picture shows, wherever the camera looks."""
     turn = Rotation.from_euler("xz", [90 + tilt, 30], degrees=True).as_matrix()
     matrix = np.eye(4)
@@ -212,13 +201,13 @@ def test_the_velocity_grid_is_as_coarse_as_the_depth_is_unknown(plume, draft) ->
     ("cue", "source"),
     [("box", "assumed"), ("floor contact", "measured"), ("inlets", "measured"), ("distance", "given")],
 )
-def test_the_cue_and_the_uncertainty_are_kept(cue: Cue, source: str) -> None:
+def test_the_cue_and_the_uncertainty_are_kept(cue, source) -> None:
     found = found_place(AxisEstimate(SmokeAxis.upright(-0.25), cue, -0.25, 0.123))
     assert (found.kind, found.figures, found.spread) == (f"axis depth by {cue}", {"depth": -0.25}, 0.123)
     assert (found.value == UNDETERMINED, found.source) == (cue == "box", source)
 
 
-def test_a_shot_knows_where_its_smoke_stands(given, plume, draft: Settings) -> None:
+def test_a_shot_knows_where_its_smoke_stands(given, plume, draft) -> None:
     assert given.place is not None and given.findings[-1] == found_place(given.place)
     inlet = replace(plume.scene, inlets=(Inlet(plume.scene.domain.centre, 0.2),))
     marked = shot_of(inlet, draft)
@@ -235,7 +224,7 @@ def test_a_shot_knows_where_its_smoke_stands(given, plume, draft: Settings) -> N
         shot_of(inlet, measured)
 
 
-def test_a_distance_sets_the_scale_where_no_box_is_given(plume, draft: Settings) -> None:
+def test_a_distance_sets_the_scale_where_no_box_is_given(plume, draft) -> None:
     """Of a camera that is not given, and of a box that is not; the smoke stands in the middle of that."""
     for camera in (None, plume.scene.camera):
         scene = replace(plume.scene, camera=camera, domain=None)
@@ -246,14 +235,13 @@ def test_a_distance_sets_the_scale_where_no_box_is_given(plume, draft: Settings)
         assert place is not None and place.depth == pytest.approx(0, abs=0.06)
 
 
-def test_a_camera_that_only_turns_tells_the_place_as_one_that_stands(given, plume, draft: Settings) -> None:
+def test_a_camera_that_only_turns_tells_the_place_as_one_that_stands(given, plume, draft) -> None:
     poses = np.repeat(np.array(plume.scene.camera.matrix)[None], len(plume.densities), axis=0)
 
     def with_poses() -> Scene:
         return replace(plume.scene, camera=replace(plume.scene.camera, matrices=tuple(map(as_matrix, poses))))
 
     still, turning = given.place, shot_of(with_poses(), draft).place
-    assert still is not None and turning is not None
     assert turning.cue == still.cue
     assert turning.depth == pytest.approx(still.depth, abs=0.1 * still.deviation)
     poses[:, 0, 3] += np.linspace(0, 0.1, len(poses))  # it travels along X

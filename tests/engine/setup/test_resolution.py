@@ -35,7 +35,6 @@ def filmed(plume, tmp_path) -> Callable[..., Scene]:
 
     def film(blur: float, grain: float = 1.2) -> Scene:
         folder = tmp_path / f"{blur}-{grain}"
-        folder.mkdir()
         clip_of(folder, [ndimage.gaussian_filter(textured(grain), blur)] * 2).close()
         return replace(
             plume.scene,

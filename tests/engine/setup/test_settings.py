@@ -3,7 +3,6 @@
 import itertools
 import json
 from dataclasses import replace
-from typing import Any
 
 import pytest
 
@@ -38,7 +37,7 @@ def test_detail_is_made_up_unless_somebody_measures() -> None:
 
 
 @pytest.mark.parametrize(("quality", "method"), [*((quality, "default") for quality in QUALITIES), ("draft", "paper")])
-def test_json_holds_all_settings(quality: Any, method: Any) -> None:
+def test_json_holds_all_settings(quality, method) -> None:
     settings = Settings.preset(quality, method, (16, 16, 24))
     read = json.loads(json.dumps(settings.as_dict(), allow_nan=False))
     assert (read["quality"], read["method"], read["resolution"]) == (quality, method, [16, 16, 24])
@@ -64,6 +63,6 @@ def test_json_holds_all_settings(quality: Any, method: Any) -> None:
         ({"distance": "0.1"}, 'distance .* "0.1"'),
     ],
 )
-def test_bad_values_are_refused(values: dict[str, Any], words: str) -> None:
+def test_bad_values_are_refused(values, words) -> None:
     with pytest.raises(ValueError, match=words):
         Settings(**values)

@@ -16,7 +16,7 @@ both = pytest.mark.parametrize("camera", [PERSPECTIVE, ORTHOGRAPHIC])
 
 
 @both
-def test_a_working_pixel_is_a_voxel_wide_at_the_center(camera: Camera) -> None:
+def test_a_working_pixel_is_a_voxel_wide_at_the_center(camera) -> None:
     small = working_picture(camera, DOMAIN).camera
     h = DOMAIN.voxel_size
     origin, _ = project_points(small, CENTER)
@@ -26,7 +26,7 @@ def test_a_working_pixel_is_a_voxel_wide_at_the_center(camera: Camera) -> None:
 
 
 @pytest.mark.parametrize("camera", [PERSPECTIVE, ORTHOGRAPHIC, TILTED])
-def test_points_fall_to_the_same_place_of_both_pictures(camera: Camera) -> None:
+def test_points_fall_to_the_same_place_of_both_pictures(camera) -> None:
     work = working_picture(camera, DOMAIN)
     points = np.random.default_rng(1).uniform(DOMAIN.min, DOMAIN.max, (50, 3))
     full, depth = project_points(camera, points)
@@ -39,7 +39,7 @@ def test_points_fall_to_the_same_place_of_both_pictures(camera: Camera) -> None:
 
 
 @both
-def test_the_cut_shows_what_the_small_camera_sees(camera: Camera) -> None:
+def test_the_cut_shows_what_the_small_camera_sees(camera) -> None:
     """A picture whose values are its own coordinates, cut, reads right at the projections of world points."""
     work = working_picture(camera, DOMAIN)
     width, height = camera.size
@@ -54,14 +54,14 @@ def test_the_cut_shows_what_the_small_camera_sees(camera: Camera) -> None:
 
 
 @both
-def test_coarse_footage_is_not_enlarged(camera: Camera) -> None:
+def test_coarse_footage_is_not_enlarged(camera) -> None:
     work = working_picture(camera.resized(20, 28), DOMAIN)
     assert work.camera.size == (work.width, work.height)
     assert work.width <= 20
 
 
 @both
-def test_a_domain_outside_the_view_is_refused(camera: Camera) -> None:
+def test_a_domain_outside_the_view_is_refused(camera) -> None:
     beside = Domain((9.4, -0.6, 0), (10.6, 0.6, 1.6), (24, 24, 32))
     with pytest.raises(CameraError, match="domain"):
         working_picture(camera, beside)

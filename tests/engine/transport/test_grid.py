@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from smokelift import _core
-from smokelift.transport import Velocity, advect, project
+from smokelift import Velocity, _core, advect, project
 from tests.engine.transport.random_fields import SHAPE, random_velocity, uniform
 
 

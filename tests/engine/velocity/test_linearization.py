@@ -20,7 +20,6 @@ def test_what_a_shift_explains_is_linear_in_it(shape):
     before = np.broadcast_to(10 + y + 2 * z, shape).copy()
     rest = StaggeredGrid.zero(shape, 1.0)
     linear = linearize(before, before - 1, np.ones(shape, np.float32), rest)
-    assert linear is not None
     assert linear.scale == pytest.approx(5**0.5)
     np.testing.assert_allclose(linear.offset * linear.scale, -1, rtol=1e-5)
     upwards = rest.with_faces([rest.faces[0], rest.faces[1], rest.faces[2] + np.float32(0.5)])

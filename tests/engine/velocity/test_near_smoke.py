@@ -30,20 +30,17 @@ def flow(speed: float, closed: tuple[str, ...] = ()) -> Velocity:
 
 @pytest.mark.parametrize("speed", [0.0, 0.5, 5.0])
 @pytest.mark.parametrize("conserve", [False, True])
-def test_smoke_is_carried_as_by_the_velocity_of_the_whole_box(speed: float, conserve: bool) -> None:
+def test_smoke_is_carried_as_by_the_velocity_of_the_whole_box(speed, conserve) -> None:
     velocity = flow(speed, ("z-",))
     expected = advect(puff(), refine(velocity, SHAPE), 1.0, conserve=conserve)
     np.testing.assert_allclose(carry(puff(), velocity, 1.0, 1.0, conserve=conserve), expected, atol=1e-5)
     assert expected.any()
 
 
-def test_where_no_smoke_is_nothing_is_carried() -> None:
+def test_velocity_is_right_where_smoke_can_arrive_and_zero_where_none_is() -> None:
     nothing = np.zeros(SHAPE, np.float32)
     assert not carry(nothing, flow(1.0), 1.0, 1.0).any()
     assert not any(component.any() for component in near_smoke(flow(1.0), nothing > 0, 1.0, 1.0).faces)
-
-
-def test_velocity_is_right_where_smoke_can_arrive_and_zero_far_away() -> None:
     velocity, smoke = flow(1.0), puff() > 0
     whole, near = refine(velocity, SHAPE), near_smoke(velocity, smoke, 1.0, 1.0)
     assert near.voxel_size == 1.0
@@ -55,7 +52,7 @@ def test_velocity_is_right_where_smoke_can_arrive_and_zero_far_away() -> None:
     assert near_smoke(whole, smoke, 1.0, 1.0) is whole
 
 
-def test_slabs_of_a_large_box_are_as_the_box(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_slabs_of_a_large_box_are_as_the_box(monkeypatch) -> None:
     density, velocity = puff(), flow(1.0)
     density[30:34, 28:32, 40:44] = 0.5
     carried, near = carry(density, velocity, 1.0, 1.0), near_smoke(velocity, density > 0, 1.0, 1.0)

@@ -48,7 +48,7 @@ def rest() -> Velocity:
 
 
 @pytest.mark.parametrize("kind", ["perspective", "orthographic"])
-def test_smoke_at_rest_is_moved_as_the_picture_moves(kind: str) -> None:
+def test_smoke_at_rest_is_moved_as_the_picture_moves(kind) -> None:
     """By meters that look as wide as the pixels, somewhat fewer; by none along the line of sight."""
     found = seen(rest(), 0.6, 0.9, kind).centres()[BOX] * DT
     (pixels, *_) = project_points(camera(kind), np.array([[0.0, 0.0, 0.75], [0.01, 0.0, 0.75]]))
@@ -75,7 +75,7 @@ def test_it_has_no_divergence_and_keeps_what_is_known() -> None:
 
 
 @pytest.mark.parametrize("picture", [np.zeros((60, 40), np.float32), np.ones((60, 40), np.float32)])
-def test_a_picture_without_smoke_or_structure_corrects_nothing(picture: np.ndarray) -> None:
+def test_a_picture_without_smoke_or_structure_corrects_nothing(picture) -> None:
     density = np.zeros(DOMAIN.resolution, np.float32)
     found = with_seen_motion(rest(), picture, picture, camera("perspective"), DOMAIN, density, DT)
     assert not any(component.any() for component in found.faces)
@@ -87,7 +87,7 @@ def test_the_paper_follows_no_picture() -> None:
 
 
 @pytest.mark.parametrize("size", [(1, 1), (1, 9), (9, 1)])
-def test_a_picture_may_be_a_single_row_or_column(size: tuple[int, int]) -> None:
+def test_a_picture_may_be_a_single_row_or_column(size) -> None:
     domain = Domain((-0.1, -0.1, 0.0), (0.1, 0.1, 0.2), (1, 1, 1))
     before, after = np.random.default_rng(0).random((2, *size[::-1]), np.float32)
     velocity = Velocity.zero(domain.resolution, domain.voxel_size)
