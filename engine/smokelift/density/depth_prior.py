@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 
 from smokelift.density.hull import Places, project_voxels
 from smokelift.density.levels import any_of_two, with_neighbors
-from smokelift.density.objective import Term
 from smokelift.density.observation import ObservedClip, ObservedView, ViewSet, shadowed_optical_depth
 from smokelift.density.profile import PROFILE_CUT, DepthProfile
 from smokelift.density.upright_plane import SmokeAxis, view_frame
@@ -42,7 +41,7 @@ class Detail(Protocol):
     @property
     def smooth(self) -> Volume: ...
 
-    def added(self, density: Volume, cameras: Sequence[Term], *, fresh: bool) -> Volume:
+    def added(self, density: Volume, *, fresh: bool) -> Volume:
         """Add detail to a density (nx, ny, nz), zero outside the hull, as far as the cameras' pictures allow.
 
         ``fresh`` says that nothing of the density is carried on from the frame before.

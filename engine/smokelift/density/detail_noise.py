@@ -46,7 +46,7 @@ def _sum(
     if level.coarser is not None:
         coarse, motions, octaves = _sum(level.coarser, moved, width, strengths, unread)
         for found, values in zip((noise, *motion), (coarse, *motions), strict=True):
-            found[...] = level.coarser.finer(level.coarser.views.volume(values), level)
+            found[...] = level.from_coarser(level.coarser.views.volume(values))
     middle = (size - 1) / 2 - moved
 
     def octave(blur: float, strength: float) -> NDArray[np.float32]:

@@ -20,7 +20,7 @@ from smokelift.density.descent import descend
 from smokelift.density.levels import BLUR_REACH
 from smokelift.density.multiplicative import fit_multiplicative
 from smokelift.density.objective import camera_terms
-from smokelift.density.observation import BLACK, Observation, ViewSet, eight_bit_plate
+from smokelift.density.observation import Observation, ViewSet, eight_bit_plate
 from smokelift.extraction.element import extract_element, shows_transmittance, usual_source
 from smokelift.extraction.given_background import backdrop_color, background_picture
 from smokelift.extraction.plate import Plate
@@ -137,7 +137,7 @@ class GradientFit:
         plausible = smooth = None
         if depth.detail is not None:
             plausible, smooth = depth.density, depth.detail.smooth
-            start = depth.detail.added(start, cameras, fresh=fresh)
+            start = depth.detail.added(start, fresh=fresh)
             iterations *= 1 + fresh  # detail that is all new is far from the pictures
         scaled = fit_multiplicative(cameras, start, iterations, settings.tolerance, where, plausible)
         expected, started = (float(where.take(values).max()) for values in (depth.density, start))
@@ -219,7 +219,7 @@ def reconstruct_density(
     require_kind(settings, DensitySettings | None, "settings", "DensitySettings (settings.density of a run's)")
     views = listed(views, Observation, "views", "a list of Observations")
     optics = scene_optics(complete)
-    own = Observation(complete.camera, image, BLACK if plate is None else plate)
+    own = Observation(complete.camera, image, plate)
     seen = ViewSet.of([_with_plate(each, complete) for each in (own, *views)], optics)
     if initial is not None:
         initial = _checked_initial(initial, optics.domain)
@@ -233,11 +233,10 @@ def _with_plate(observation: Observation, scene: CompleteScene) -> Observation:
 
     Before a picture that shows how much of it smoke lets through, its smoke is extracted.
     """
-    camera = observation.camera
-    if observation.plate is BLACK:
+    camera, picture, plate = observation.camera, observation.image, observation.plate
+    if plate is None:
         plate = eight_bit_plate(background_picture(scene, camera), camera.size)
         observation = replace(observation, plate=plate)
-    picture, plate = observation.image, observation.plate
     if observation.element is not None or backdrop_color(plate.image) is not None:
         return observation
     source = usual_source([(picture, plate)], camera.size)

@@ -23,7 +23,6 @@ from smokelift.density.depth_prior import DepthEstimate, RoundDepth
 from smokelift.density.detail_noise import stretched_noise
 from smokelift.density.levels import TINY, Level
 from smokelift.density.multiplicative import fit_multiplicative, take_turns
-from smokelift.density.objective import Term
 from smokelift.density.observation import ObservedClip, ViewSet
 from smokelift.density.texture import ClipTexture, Exemplar, Picture, enlarged
 from smokelift.density.turntable import Turntable, UprightSmoke
@@ -138,7 +137,7 @@ def _smooth_answer(level: Level, density: Volume) -> Volume:
     if coarser is None:
         fitted = fit_multiplicative(level.terms(), density, SMOOTH_ITERATIONS, SMOOTH_TOLERANCE, level.views.where)
         return fitted.density
-    return coarser.changed(density, level, lambda means: _smooth_answer(coarser, means))
+    return level.changed_on_coarser(density, lambda means: _smooth_answer(coarser, means))
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,35 +159,25 @@ class EveryView:
         if coarser is None or len(texture.exemplars) == 1:
             return None
         texture = texture.halved(coarser.views.optics.domain)
-        return EveryView(texture, coarser, coarser.means(self.smooth, self.level), self.strength)
+        return EveryView(texture, coarser, self.level.coarse_means(self.smooth), self.strength)
 
-    def added(self, density: Volume, cameras: Sequence[Term], *, fresh: bool) -> Volume:
+    def added(self, density: Volume, *, fresh: bool) -> Volume:
         """Scale a density towards the clip's texture and the cameras' pictures in turn; see `Detail`."""
-        return self._rounds(density, cameras, self.azimuths(), fresh)
+        return self._rounds(density, self.azimuths(), fresh)
 
     def low_pass(self, density: Volume) -> NDArray[np.float32]:
         """The density (n,) blurred over lobes of smoke; see `Detail`."""
         return self.level.blurred(density, LOW_PASS * self.texture.width)
 
-    def _rounds(
-        self,
-        density: Volume,
-        cameras: Sequence[Term],
-        azimuths: Iterator[tuple[int, float]],
-        fresh: bool,
-    ) -> Volume:
-        """The rounds of all scales; those that a coarser grid holds are done there."""
+    def _rounds(self, density: Volume, azimuths: Iterator[tuple[int, float]], fresh: bool) -> Volume:
+        """The rounds of all scales; those that a coarser grid holds are done there, with the first of the azimuths."""
         coarser, exemplars = self.coarser, self.texture.exemplars
         if coarser is not None:
-            density = coarser.level.changed(
-                density,
-                self.level,
-                lambda means: coarser._rounds(means, coarser.level.terms(), azimuths, fresh),
-            )
+            density = self.level.changed_on_coarser(density, lambda means: coarser._rounds(means, azimuths, fresh))
             exemplars = tuple(exemplar for exemplar in exemplars if exemplar.scale == 1)
         if not exemplars:
             return density
-        table, hull = self.texture.turntable, self.level.views.hull
+        cameras, table, hull = self.level.terms(), self.texture.turntable, self.level.views.hull
         box = list(box_around(hull, 0))
         box[table.axis] = slice(None)  # rays turn about the axis, along which all of the grid stays
         part = tuple(box)
@@ -202,7 +191,7 @@ class EveryView:
                     self._step(turned, smooth, exemplar, next(azimuths), relaxation)
                 changed = np.zeros(hull.shape, np.float32)
                 np.copyto(changed[part], table.lying(turned.values), where=hull[part])
-                density = take_turns(cameras, changed, 1, self.level.views.where)
+                density = take_turns(cameras, changed, self.level.views.where)
         return density
 
     def _step(

@@ -18,7 +18,6 @@ import numpy as np
 
 from smokelift.density.depth_prior import DepthEstimate
 from smokelift.density.levels import TINY
-from smokelift.density.observation import ViewSet
 from smokelift.render import Volume
 
 LARGEST_GAIN = 1.5
@@ -40,15 +39,13 @@ class Start:
 class TemporalPrior(Protocol):
     """What is taken over from the frame before."""
 
-    def start(self, views: ViewSet, depth: DepthEstimate, carried: Volume, smooth: Volume) -> Start:
+    def start(self, depth: DepthEstimate, carried: Volume, smooth: Volume) -> Start:
         """Where the fit starts.
 
         Parameters
         ----------
-        views
-            The pictures of the frame.
         depth
-            What the depth prior says of them.
+            What the depth prior says of the frame's pictures.
         carried : (nx, ny, nz)
             The density of the frame before, carried along by the predicted velocity.
         smooth : (nx, ny, nz)
@@ -60,7 +57,7 @@ class TemporalPrior(Protocol):
 class NothingCarried:
     """Every frame starts from its own pictures."""
 
-    def start(self, views: ViewSet, depth: DepthEstimate, carried: Volume, smooth: Volume) -> Start:
+    def start(self, depth: DepthEstimate, carried: Volume, smooth: Volume) -> Start:
         """The depth prior's density; see `TemporalPrior`."""
         return Start(depth.density, {})
 
@@ -82,12 +79,13 @@ class GuidedSimulation:
 
     blend: float
 
-    def start(self, views: ViewSet, depth: DepthEstimate, carried: Volume, smooth: Volume) -> Start:
+    def start(self, depth: DepthEstimate, carried: Volume, smooth: Volume) -> Start:
         """The carried density with the smooth answer's low pass; see `TemporalPrior`.
 
         Its figure ``share`` is the fraction of the smoke that is.
         """
-        prior, detail, where = depth.density, depth.detail, views.where
+        prior, detail, views = depth.density, depth.detail, depth.views
+        where = views.where
         if detail is None or not where.count:
             blend = self.blend if prior.any() and carried.any() else 0.0
             return Start(np.float32(1 - blend) * prior + np.float32(blend) * carried, {"share": blend})

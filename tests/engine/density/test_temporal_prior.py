@@ -1,6 +1,5 @@
 """How much of the carried density a frame starts from: a share, or its detail with the smooth answer's low pass."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -8,7 +7,6 @@ import pytest
 from scipy import ndimage
 
 from smokelift.density import DepthEstimate, GuidedSimulation, Observation, RoundDepth, Start, ViewSet
-from smokelift.density.objective import Term
 from smokelift.density.observation import eight_bit_plate
 from smokelift.density.temporal_prior import LARGEST_GAIN, RETENTION
 from smokelift.render import Volume, render, scene_optics
@@ -31,9 +29,7 @@ class Moment:
 
     def start(self, carried: Volume, smooth: Volume | None = None) -> Start:
         """Where the fit starts with a carried density, which is its own smooth answer unless that is given."""
-        return GuidedSimulation(BLEND).start(
-            self.depth.views, self.depth, carried, carried if smooth is None else smooth
-        )
+        return GuidedSimulation(BLEND).start(self.depth, carried, carried if smooth is None else smooth)
 
 
 @pytest.fixture(scope="module")
@@ -72,7 +68,7 @@ class Lobes:
     views: ViewSet
     smooth: Volume
 
-    def added(self, density: Volume, cameras: Sequence[Term], *, fresh: bool) -> Volume:
+    def added(self, density: Volume, *, fresh: bool) -> Volume:
         return density
 
     def low_pass(self, density: Volume) -> np.ndarray:
