@@ -48,8 +48,8 @@ class DensitySettings:
     Attributes
     ----------
     fit_iterations
-        Multiplicative iterations at most, for each view; the fit is within a few per cent after six, and each further
-        one gains less than a step of descent costs.
+        Multiplicative iterations at most, for each view, and twice as many where made-up detail is all new; the fit is
+        within a few per cent after six, and each further one gains less than a step of descent costs.
     descent_iterations
         Steps of descent at most.
     tolerance
@@ -79,7 +79,8 @@ class FittedDensity:
     ----------
     density : (nx, ny, nz) float32
     hull : (nx, ny, nz) bool
-        Voxels that the pictures allow to hold smoke and in which the depth prior expects any.
+        Voxels that the fit could fill: those that the pictures allow to hold smoke and in which the depth prior expects
+        any. All of them by the paper's method; none in a frame that shows nothing of the domain.
     figures
         ``loss`` (sum of squared differences over all cameras' pictures) and ``psnr`` (dB, peak 1) of the input's
         picture as its view has it, in linear radiance, over the pixels that its smoke's voxels can change, all alike;
@@ -87,9 +88,9 @@ class FittedDensity:
         root mean square of the input's differences over that of what changes there, with what its element leaves out as
         no smoke in both: 1 if nothing is fitted, however faint the smoke; ``iterations``; ``hull_share``, the hull's
         fraction of the voxels.
-    smooth : (nx, ny, nz) float32, optional
-        The density without what the depth prior makes up (`Detail.smooth`); None if that is all of it.
-    steady : (nx, ny, nz) float32, optional
+    smooth_density : (nx, ny, nz) float32, optional
+        The density without made-up detail (`Detail.smooth_density`); None if nothing was made up.
+    for_advection : (nx, ny, nz) float32, optional
         The density that a next frame carries along; None if that is `density`. It has what the descent changes from
         some voxels to the next, but not in single ones: that would pile up along the rays from frame to frame.
     """
@@ -97,8 +98,8 @@ class FittedDensity:
     density: Volume
     hull: NDArray[np.bool_]
     figures: Mapping[str, float] = field(default_factory=dict)
-    smooth: Volume | None = None
-    steady: Volume | None = None
+    smooth_density: Volume | None = None
+    for_advection: Volume | None = None
 
 
 class DensityFit(Protocol):
@@ -130,13 +131,13 @@ class GradientFit:
         hull, where = views.hull, views.where
         if not where.count:
             return empty_density(views)
-        cameras = camera_terms(views, depth.inside)
+        cameras = camera_terms(views, depth.inside_fraction)
         start, fresh = views.volume(where.take(depth.density if initial is None else initial)), initial is None
         # The terms take turns, so several cameras need as many times more iterations.
         iterations = settings.fit_iterations * len(cameras)
         plausible = smooth = None
         if depth.detail is not None:
-            plausible, smooth = depth.density, depth.detail.smooth
+            plausible, smooth = depth.density, depth.detail.smooth_density
             start = depth.detail.added(start, fresh=fresh)
             iterations *= 1 + fresh  # detail that is all new is far from the pictures
         scaled = fit_multiplicative(cameras, start, iterations, settings.tolerance, where, plausible)
@@ -155,12 +156,12 @@ class GradientFit:
             expected=prior,
         )
         figures = fit_figures(views, final.residuals, scaled.iterations + final.iterations)
-        steady = None
+        for_advection = None
         if smooth is not None:
-            steady = views.volume(began)
+            for_advection = views.volume(began)
             if final.iterations:
-                steady = _without_single_voxels(steady, final.density, hull)
-        return FittedDensity(without_traces(final.density, where), hull, figures, smooth, steady)
+                for_advection = _without_single_voxels(for_advection, final.density, hull)
+        return FittedDensity(without_traces(final.density, where), hull, figures, smooth, for_advection)
 
 
 def reconstruct_density(

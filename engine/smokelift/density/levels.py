@@ -39,11 +39,12 @@ their middles, have a variance of 11/12 of a finer voxel. So a blur there is 5 %
 class Level:
     """A pyramid level: a moment on one grid, whose voxels are each `coarseness` voxels of the finest grid wide.
 
-    `inside` has a picture (rows, columns) for each view: the fraction of every ray's smoke that lies inside the domain.
+    `inside_fraction` has a picture (rows, columns) for each view: the fraction of every ray's smoke that lies inside
+    the domain. What involves the coarser level may be asked only where there is one.
     """
 
     views: ViewSet
-    inside: tuple[NDArray[np.float32], ...]
+    inside_fraction: tuple[NDArray[np.float32], ...]
     coarseness: int = 1
 
     @cached_property
@@ -55,13 +56,13 @@ class Level:
         optics = replace(views.optics, domain=views.optics.domain.coarser(2))
         seen = tuple(view.coarser(optics) for view in views.views)
         inside = tuple(
-            area_average(fraction, *view.camera.size) for fraction, view in zip(self.inside, seen, strict=True)
+            area_average(fraction, *view.camera.size) for fraction, view in zip(self.inside_fraction, seen, strict=True)
         )
         return Level(ViewSet(seen, any_of_two(views.hull), optics, views.frame), inside, 2 * self.coarseness)
 
     def terms(self) -> list[Term]:
         """Terms of the cameras' pictures; see `camera_terms`."""
-        return camera_terms(self.views, self.inside)
+        return camera_terms(self.views, self.inside_fraction)
 
     def from_coarser(self, values: Volume) -> NDArray[np.float32]:
         """Values of the coarser grid at this one's voxels (n,) that may hold smoke, linear between middles."""

@@ -195,7 +195,7 @@ class ObservedView:
             self.camera.resized(columns, rows), image, background, noise, left_out, probability, optics
         )
 
-    def before_darkness(self, source: NDArray[np.float64]) -> bool:
+    def against_darkness(self, source: NDArray[np.float64]) -> bool:
         """Whether the background is dark beside a source radiance (3,) wherever smoke shows."""
         return bool((self.background[self.mask] <= MAX_DARK_RADIANCE * _in_channels(source, self.background)).all())
 
@@ -209,7 +209,8 @@ class ObservedView:
 class ViewSet:
     """All views of one moment, the input's first.
 
-    `hull` (nx, ny, nz) marks the voxels that all of them allow to hold smoke. `frame` is the number of the moment in
+    `hull` (nx, ny, nz) marks the voxels that may hold smoke: those that all of them allow, or fewer where a depth prior
+    expects none (`DepthEstimate.views`). `frame` is the number of the moment in
     its clip, from 0: a depth prior that has seen the clip knows the other moments.
     """
 

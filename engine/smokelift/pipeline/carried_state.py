@@ -20,24 +20,24 @@ class CarriedState:
     density : (nx, ny, nz) float32
     velocity
         In m/s, on the grid of its estimate, all over the domain.
-    smooth : (nx, ny, nz) float32, optional
+    smooth_density : (nx, ny, nz) float32, optional
         The density without made-up detail, from which velocity is estimated; None if nothing was made up.
-    steady : (nx, ny, nz) float32, optional
+    for_advection : (nx, ny, nz) float32, optional
         What the next frame carries along, if not the density: see `smokelift.density.FittedDensity`.
-    followed : (rows, columns), optional
-        What is followed of the picture to the next one; None where that is not done. It is not stored.
+    picture : (rows, columns), optional
+        The picture from which optical flow to the next one is found; None where it is not used. It is not stored.
     """
 
     number: int
     density: Volume
     velocity: Velocity
-    smooth: Volume | None = None
-    steady: Volume | None = None
-    followed: Picture | None = None
+    smooth_density: Volume | None = None
+    for_advection: Volume | None = None
+    picture: Picture | None = None
 
     def stored(self) -> ResumeState:
         """What a run that is resumed after the frame reads."""
-        volumes = {"smooth": self.smooth, "steady": self.steady}
+        volumes = {"smooth": self.smooth_density, "steady": self.for_advection}
         kept = {name: volume for name, volume in volumes.items() if volume is not None}
         return ResumeState(self.number, self.density, self.velocity.faces, kept)
 
@@ -48,5 +48,5 @@ class CarriedState:
         shape = shot.optics.domain.resolution
         while shape != velocity.shape:
             shape, velocity = halved(shape), replace(velocity, voxel_size=2 * velocity.voxel_size)
-        smooth, steady = (state.extra.get(name) for name in ("smooth", "steady"))
-        return CarriedState(state.number, state.density, velocity, smooth, steady)
+        smooth, for_advection = (state.extra.get(name) for name in ("smooth", "steady"))
+        return CarriedState(state.number, state.density, velocity, smooth, for_advection)

@@ -26,7 +26,7 @@ from smokelift.render.device import products_on_one_thread
 from smokelift.setup.shot import Shot
 from smokelift.transport import Array, Velocity
 from smokelift.velocity.estimator import DensityPair
-from smokelift.velocity.near_smoke import carry, near_smoke
+from smokelift.velocity.near_smoke import advect_near, refine_near_smoke
 from smokelift.velocity.optical_flow import PicturePair
 
 
@@ -63,15 +63,15 @@ def frames_after(before: CarriedState | None, shot: Shot, method: Method) -> Ite
     The first waits until the second gives it a velocity.
     """
     count = len(shot.clip)
-    follows = method.follows_picture and len(shot.views) == 1 and not shot.moves
+    flow = method.optical_flow and len(shot.views) == 1 and not shot.moves
     with products_on_one_thread():
         method = replace(method, depth_prior=method.depth_prior.of_clip(shot))
-        if before is not None and follows:  # a run that goes on: its state has no picture
-            before = replace(before, followed=_followed(_seen(before.number - 1, shot)))
+        if before is not None and flow:  # a run that goes on: its state has no picture
+            before = replace(before, picture=_flow_picture(_seen(before.number - 1, shot)))
     first: tuple[Frame, CarriedState] | None = None
     for index in range(before.number if before else 0, count):
         with products_on_one_thread():
-            frame, before = _frame(index, before, shot, method, follows=follows)
+            frame, before = _frame(index, before, shot, method, flow=flow)
         if index == 0 and count > 1:
             first = frame, before
             continue
@@ -83,7 +83,7 @@ def frames_after(before: CarriedState | None, shot: Shot, method: Method) -> Ite
 
 
 def _frame(
-    index: int, before: CarriedState | None, shot: Shot, method: Method, *, follows: bool
+    index: int, before: CarriedState | None, shot: Shot, method: Method, *, flow: bool
 ) -> tuple[Frame, CarriedState]:
     """One frame, counted from 0, from its pictures and what the frame before hands on; and what it hands on itself."""
     began = time.perf_counter()
@@ -94,7 +94,7 @@ def _frame(
         predicted = method.velocity_estimator.predict(before.velocity, dt)
     views = _seen(index, shot)
     fitted, taken_over = _density(views, before, predicted, shot, method)
-    followed = _followed(views) if follows else None
+    picture = _flow_picture(views) if flow else None
     flame = _flame(index, fitted.density, shot)
     fit = _fit_figures(index, fitted, shot)
     fit_done = time.perf_counter()
@@ -103,10 +103,10 @@ def _frame(
     else:
         pair = DensityPair(*_measured(before, fitted), dt, domain.voxel_size, shot.scene.closed, shot.scene.inflow())
         pictures = None
-        if views is not None and before.followed is not None and followed is not None:
-            pictures = PicturePair(before.followed, followed, views.views[0].camera, domain)
+        if views is not None and before.picture is not None and picture is not None:
+            pictures = PicturePair(before.picture, picture, views.views[0].camera, domain)
         estimated = method.velocity_estimator.estimate(pair, predicted, pictures)
-        velocity = near_smoke(estimated, (before.density > 0) | (fitted.density > 0), dt, domain.voxel_size)
+        velocity = refine_near_smoke(estimated, (before.density > 0) | (fitted.density > 0), dt, domain.voxel_size)
     done = time.perf_counter()
     figures = {
         **fit,
@@ -116,8 +116,10 @@ def _frame(
         "seconds_density": fit_done - began,
         "seconds_velocity": done - fit_done,
     }
-    frame = Frame(index + 1, fitted.density, velocity, figures, flame)
-    return frame, CarriedState(index + 1, fitted.density, estimated, fitted.smooth, fitted.steady, followed)
+    number = index + 1
+    return Frame(number, fitted.density, velocity, figures, flame), CarriedState(
+        number, fitted.density, estimated, fitted.smooth_density, fitted.for_advection, picture
+    )
 
 
 def _seen(index: int, shot: Shot) -> ViewSet | None:
@@ -126,8 +128,8 @@ def _seen(index: int, shot: Shot) -> ViewSet | None:
     return ViewSet.of(observations, shot.optics, index) if observations else None
 
 
-def _followed(views: ViewSet | None) -> Picture | None:
-    """What is followed of the only camera's picture, so that thin smoke counts; None if it shows nothing."""
+def _flow_picture(views: ViewSet | None) -> Picture | None:
+    """What optical flow is found in: roots of the only camera's optical depths, so that thin smoke counts."""
     return None if views is None else np.sqrt(views.views[0].optical_depth)
 
 
@@ -141,9 +143,9 @@ def _fit_figures(index: int, fitted: FittedDensity, shot: Shot) -> dict[str, flo
 
 def _measured(before: CarriedState, fitted: FittedDensity) -> tuple[Volume, Volume]:
     """The densities of two frames, without what is made up if that is known of both: it shows no motion of its own."""
-    if before.smooth is None or fitted.smooth is None:
+    if before.smooth_density is None or fitted.smooth_density is None:
         return before.density, fitted.density
-    return before.smooth, fitted.smooth
+    return before.smooth_density, fitted.smooth_density
 
 
 def _density(
@@ -171,22 +173,24 @@ def _density(
     fitted = method.density_fit.fit(views, priors.pop(), starts.pop())
     if unseen is not None:
         visible = project_voxels(views.views[0].camera, shot.optics.domain).visible
-        density, kept = np.where(visible, fitted.density, unseen[0]), fitted.smooth
+        density, kept = np.where(visible, fitted.density, unseen[0]), fitted.smooth_density
         if kept is not None:
             kept = np.where(visible, kept, unseen[1])
-        fitted = replace(fitted, density=density, smooth=kept, steady=None)
+        fitted = replace(fitted, density=density, smooth_density=kept, for_advection=None)
     return fitted, figures
 
 
 def _carried(before: CarriedState | None, predicted: Velocity | None, shot: Shot) -> tuple[Volume, Volume] | None:
-    """The density of the frame before and its smooth answer, carried along; None where there is no prediction."""
+    """The density of the frame before and its smooth density, carried along; None where there is no prediction."""
     if before is None or predicted is None:
         return None
-    density = before.density if before.steady is None else before.steady
+    density = before.density if before.for_advection is None else before.for_advection
     # what a moving camera does not see no picture corrects, so that its mass has to be kept
     dt, h = 1.0 / shot.clip.fps, shot.optics.domain.voxel_size
-    carried = carry(density, predicted, dt, h, conserve=shot.moves)
-    return carried, carried if before.smooth is None else carry(before.smooth, predicted, dt, h, conserve=shot.moves)
+    carried = advect_near(density, predicted, dt, h, conserve=shot.moves)
+    if before.smooth_density is None:
+        return carried, carried
+    return carried, advect_near(before.smooth_density, predicted, dt, h, conserve=shot.moves)
 
 
 def _flame(index: int, density: Volume, shot: Shot) -> Volume | None:

@@ -22,7 +22,7 @@ from smokelift.setup.illumination import find_scattering, first_light, light_dou
 from smokelift.setup.medium import find_medium
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot, ShotView
-from smokelift.velocity.pyramid import COARSEST_SIDE, halvings
+from smokelift.velocity.pyramid import COARSEST_SIDE, default_coarsening
 
 SHADOWED_SOURCE = 0.5
 """Usual source radiance of smoke over that without shadows, within the factor of two that an extraction needs (measured
@@ -71,12 +71,12 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
         inlets=scene.inlets,
     )
     source = _source_in_light(estimate, complete) if scene.lights else estimate.source
-    first = replace(ShotView.before(domain, estimate.clip, camera, estimate.plate), source=source)
+    first = replace(ShotView.facing(domain, estimate.clip, camera, estimate.plate), source=source)
     complete, of_scattering = _with_scattering(complete, asked, first, estimate, bool(of_light), settings)
     if complete.scattering == "absorption":
         of_light = [found for found in of_light if found.about != "source radiance"]
     others, of_views = open_views(first, complete, samples.typical, bool(scene.lights), settings)
-    # with an alpha channel no background is left to estimate, so that strokes alone decide it
+    # with an alpha channel, which leaves no background to estimate, strokes alone count as a given one
     decided = scene.background is not None and (not scene.background.estimated or estimate.found.source == "alpha")
     findings = [
         *clip.findings(),
@@ -157,7 +157,7 @@ def velocity_coarsening(domain: Domain, settings: Settings) -> tuple[int, Findin
     about = "velocity grid coarsening"
     if (given := settings.velocity.coarsening) is not None:
         return given, Finding("given", about=about, value=given, source="given")
-    coarsening = halvings(domain.resolution)
+    coarsening = default_coarsening(domain.resolution)
     figures = {"voxels": float(-(-max(domain.resolution) // 2**coarsening)), "tolerance": COARSEST_SIDE}
     return coarsening, Finding(about, figures, about=about, value=coarsening, source="measured")
 

@@ -1,4 +1,4 @@
-"""The default estimator: on one coarse grid, or between two densities alone from coarse grids to their own."""
+"""The default estimator: on one coarse grid in a reconstruction, else coarse to fine."""
 
 from collections import Counter
 from dataclasses import dataclass, field, replace
@@ -13,7 +13,7 @@ from smokelift.velocity.linearization import SMOKE_THRESHOLD, least_squares, lin
 from smokelift.velocity.momentum import fit_center
 from smokelift.velocity.optical_flow import PicturePair, correct_by_optical_flow
 from smokelift.velocity.preparation import PreparedPair, prepare
-from smokelift.velocity.pyramid import coarsen_density, coarsen_velocity, halvings, smooth_velocity
+from smokelift.velocity.pyramid import coarsen_density, coarsen_velocity, default_coarsening, smooth_velocity
 from smokelift.velocity.solver import ProjectedCG, Solver
 
 ONE_VIEW_SMOOTHNESS = 10.0
@@ -50,9 +50,9 @@ class VelocitySettings:
     Attributes
     ----------
     coarsening
-        How many times the grid of the estimate is halved. The velocity is interpolated to the densities' grid. None
-        leaves at most 30 voxels along the longest side in a clip (see `smokelift.setup`), and the densities' own grid
-        between two densities alone.
+        How many times the grid of the estimate is halved. The velocity is interpolated to the densities' grid. None is
+        the densities' own grid, but in a clip whose open choices are measured (`Settings.measure`) one of at most 30
+        voxels along the longest side.
     linearizations
         Linearizations on each grid (docs/experiments/velocity-solver.md).
     smoothness
@@ -116,7 +116,7 @@ def _found(pair: DensityPair, given: Velocity | None, settings: VelocitySettings
     x, y, z = shape = pair.before.shape
     prepared, weight = prepare(pair.before, pair.after), motion_weight(shape, pair.inflow)
     start = prediction = _usable_prediction(given, pair, prepared, weight)
-    if start is None and halvings((x, y, z)):
+    if start is None and default_coarsening((x, y, z)):
         coarse = _found(_half(pair), None, settings)
         start = None if coarse is None else refine(coarse, (x, y, z)).displacement(pair.dt)
     u = StaggeredGrid.zero(shape, 1.0, pair.closed) if start is None else start
@@ -164,12 +164,12 @@ def _solved(
         center = fit_center(prediction, prepared.after, linear, u)
         linear = linear.with_dissipation(center.dissipation)
         unexplained, _ = linear.unexplained(center.motion, prepared.noise)
-        stiffness = UNEXPLAINED / max(unexplained, MIN_UNEXPLAINED)
+        scale = UNEXPLAINED / max(unexplained, MIN_UNEXPLAINED)
         problem = least_squares(
             linear,
             center.motion,
-            second_order=stiffness * settings.smoothness,
-            kinetic=stiffness * KINETIC,
+            second_order=scale * settings.smoothness,
+            kinetic=scale * KINETIC,
             irrotational=IRROTATIONAL,
         )
         start = u if any(component.any() for component in u.faces) else center.motion

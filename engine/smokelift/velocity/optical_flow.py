@@ -116,7 +116,7 @@ def _correction(image: "_ImageGrid", motion: NDArray[np.float64], pictures: Pict
     steep = np.flatnonzero((gradient[0] != 0) | (gradient[1] != 0))  # the others say nothing
     pixels = image.pixels[steep]
     along = sparse.hstack([pixels.multiply(part[steep, None]) for part in gradient]).tocsr()
-    normal = (along.T @ along / steepness + sparse.block_diag([image.stiffness] * 2)).tocsr()
+    normal = (along.T @ along / steepness + sparse.block_diag([image.penalty] * 2)).tocsr()
     right = along.T @ (carried - after).ravel()[steep] / steepness
     found, _ = cg(normal, right, rtol=TOLERANCE, maxiter=MAX_STEPS, M=sparse.diags(1 / normal.diagonal()))
     # sums may be taken in another order on another day, and a run has to be the same to the bit
@@ -137,7 +137,7 @@ class _ImageGrid:
     grid."""
     least: NDArray[np.float64]
     """(voxels, 3, 2): the least motion in the grid for each column and row."""
-    stiffness: sparse.csr_matrix
+    penalty: sparse.csr_matrix
     """What a correction costs beside what it explains."""
 
     @staticmethod
@@ -161,9 +161,9 @@ class _ImageGrid:
             for down, across in ((rows, columns), (at[:, 1], at[:, 0]))
         )
         laplacian = sparse.kronsum(*(_differences(count) for count in counts[::-1]))
-        stiffness = CURVATURE * laplacian @ laplacian + REST * sparse.identity(counts[0] * counts[1])
-        stiffness *= sizes[0] * sizes[1]
-        return _ImageGrid(shape, pixels, voxels, moved, np.linalg.pinv(moved), stiffness.tocsr())
+        penalty = CURVATURE * laplacian @ laplacian + REST * sparse.identity(counts[0] * counts[1])
+        penalty *= sizes[0] * sizes[1]
+        return _ImageGrid(shape, pixels, voxels, moved, np.linalg.pinv(moved), penalty.tocsr())
 
     def mean_motion(self, motion: Array, density: Array) -> NDArray[np.float64]:
         """Mean along the rays (cells, 2), in columns and rows per frame, of a motion (nx, ny, nz, 3) in voxels."""

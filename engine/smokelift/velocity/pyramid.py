@@ -19,7 +19,7 @@ SMOOTHING = 1 / 4
 What a reconstruction's coarse grid shows of that is most often wrong (docs/experiments/velocity-solver.md)."""
 
 
-def halvings(shape: tuple[int, int, int]) -> int:
+def default_coarsening(shape: tuple[int, int, int]) -> int:
     """How many times a grid is halved until its longest side has `COARSEST_SIDE` voxels at most."""
     count = 0
     while max(shape) > COARSEST_SIDE and min(shape) >= 2 * MIN_SIDE:

@@ -38,7 +38,7 @@ def large(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def level(shot: Shot) -> Level:
     estimate = RoundDepth().of_clip(shot).estimate(ViewSet.of(shot.observe(1), shot.optics, 1))
-    return Level(estimate.views, estimate.inside)
+    return Level(estimate.views, estimate.inside_fraction)
 
 
 def test_a_coarser_grid_covers_the_smoke_once(shot, large) -> None:

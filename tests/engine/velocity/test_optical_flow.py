@@ -81,9 +81,9 @@ def test_a_picture_without_smoke_or_structure_corrects_nothing(picture: np.ndarr
     assert not any(component.any() for component in found.faces)
 
 
-def test_the_paper_follows_no_picture() -> None:
-    assert compose(Settings.preset()).follows_picture
-    assert not compose(Settings.preset(method="paper")).follows_picture
+def test_the_paper_uses_no_optical_flow() -> None:
+    assert compose(Settings.preset()).optical_flow
+    assert not compose(Settings.preset(method="paper")).optical_flow
 
 
 @pytest.mark.parametrize("size", [(1, 1), (1, 9), (9, 1)])
