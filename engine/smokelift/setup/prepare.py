@@ -159,7 +159,7 @@ def velocity_coarsening(domain: Domain, settings: Settings) -> tuple[int, Findin
         return given, Finding("given", about=about, value=given, source="given")
     coarsening = default_coarsening(domain.resolution)
     figures = {"voxels": float(-(-max(domain.resolution) // 2**coarsening)), "tolerance": COARSEST_SIDE}
-    return coarsening, Finding(about, figures, about=about, value=coarsening, source="measured")
+    return coarsening, Finding(about, figures, about=about, value=coarsening, source="estimated")
 
 
 def _check(length: int, scene: Scene, settings: Settings) -> None:
