@@ -38,7 +38,7 @@ SWEEPS = {
     "`python -m benchmarks.accuracy OUT SCENES/plume-1 --runs fine:resolution=auto`. No benchmark assumes the camera, "
     "the box or the light.",
     "transport": "`python -m benchmarks.direct.continuation SCENES/{plume,two,jet}-1`",
-    "velocity": "`python -m benchmarks.velocity SCENES/plume-1/truth.npz`; `seen_motion`: `python -m "
+    "velocity": "`python -m benchmarks.velocity SCENES/plume-1/truth.npz`; `optical_flow`: `python -m "
     "benchmarks.accuracy OUT SCENES/plume-1 --runs balanced:detail=0`",
 }
 """For each package with constants set by hand, what measures a change of them."""

@@ -85,7 +85,7 @@ def leave_out(part: str, method: Method) -> Method:
     if part == "projection" and isinstance(estimator, CoarseToFine):
         return replace(method, velocity_estimator=UnprojectedPrediction(estimator.settings))
     if part == "pictures":
-        return replace(method, follows_picture=False)
+        return replace(method, optical_flow=False)
     parts = "transport, hull, depth, projection or pictures"
     raise ValueError(f"without={part}: expected {parts} of the default method.")
 

@@ -7,7 +7,7 @@ A name is a quality or "paper", then further views, then changes:
 - ``balanced:transport=0``, ``fine:velocity.coarsening=1``, ``draft:resolution=32x32x48``: settings that differ
 - ``fine:resolution=auto``: as many voxels as the clip's detail deserves and the quality allows
 - ``balanced:velocity.solver=primal-dual``: the other solver
-- ``balanced:detail=0``, ``balanced:seed=1``: the smooth answer; another plausible one
+- ``balanced:detail=0``, ``balanced:seed=1``: the smooth density; another plausible one
 - ``balanced:without=depth``: a part of the method is left out, see `ablations.leave_out`
 - ``smear``: the front picture alone is fitted, with a density that is constant along the rays
 - ``billboard``, ``blurred``: the front picture in every view, as it is or blurred

@@ -39,12 +39,12 @@ def test_a_method_without_a_part_is_a_composition():
     assert leave_out("transport", usual) == replace(usual, temporal_prior=NothingCarried())
     assert leave_out("hull", usual) == replace(usual, density_fit=WithoutHull(usual.density_fit))
     assert leave_out("depth", usual) == replace(usual, depth_prior=EvenDepth())
-    assert leave_out("pictures", usual) == replace(usual, follows_picture=False)
+    assert leave_out("pictures", usual) == replace(usual, optical_flow=False)
     assert isinstance(run_method("draft", settings).depth_prior, DetailedDepth)
     assert isinstance(run_method("draft", replace(settings, detail=0.0)).depth_prior, RoundDepth)
     both = run_method("draft:without=projection,without=pictures", settings)
     assert both.velocity_estimator == UnprojectedPrediction(settings.velocity)
-    assert not both.follows_picture
+    assert not both.optical_flow
     for run in ("draft:without=luck", "paper:without=projection"):
         with pytest.raises(ValueError, match="transport, hull"):
             run_method(run, run_settings(run))

@@ -106,7 +106,7 @@ class FixedRateDescent:
 class AllCarried:
     """The paper's temporal prior: each fit starts from the carried density as it is."""
 
-    def start(self, views: ViewSet, depth: DepthEstimate, carried: Volume, smooth: Volume) -> Start:
+    def start(self, depth: DepthEstimate, carried: Volume, smooth: Volume) -> Start:
         """The carried density; see `smokelift.density.TemporalPrior`."""
         return Start(carried, {})
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from smokelift.transport import StaggeredGrid, Velocity
 from smokelift.velocity.estimator import DensityPair, in_meters, motion_weight, predict_velocity
 from smokelift.velocity.linearization import least_squares, linearize
+from smokelift.velocity.optical_flow import PicturePair
 from smokelift.velocity.preparation import blurred
 from smokelift.velocity.solver import PrimalDual, Solver
 
@@ -28,8 +29,10 @@ class PaperVelocity:
     """Standard deviation in voxels of the Gaussian that smooths the densities."""
     solver: Solver = field(default_factory=PrimalDual)
 
-    def estimate(self, pair: DensityPair, prediction: Velocity | None = None) -> Velocity:
-        """Estimate as by `smokelift.velocity.estimate_velocity`; a prediction is not used."""
+    def estimate(
+        self, pair: DensityPair, prediction: Velocity | None = None, pictures: PicturePair | None = None
+    ) -> Velocity:
+        """Estimate as by `smokelift.velocity.estimate_velocity`; neither prediction nor pictures are used."""
         rest = StaggeredGrid.zero(pair.before.shape, 1.0, pair.closed)
         before, after = (blurred(density, self.blur) for density in (pair.before, pair.after))
         linear = linearize(before, after, motion_weight(rest.shape, pair.inflow), rest)
@@ -43,7 +46,3 @@ class PaperVelocity:
     def predict(self, velocity: Velocity, dt: float) -> Velocity:
         """The velocity of the next frame if no force acts."""
         return predict_velocity(velocity, dt)
-
-    def of_one_view(self) -> "PaperVelocity":
-        """Return itself."""
-        return self

@@ -20,7 +20,7 @@ from smokelift.density.fit import (
 from smokelift.density.observation import Observation, ObservedClip, ObservedView, ViewSet
 from smokelift.density.synthesis import DetailedDepth
 from smokelift.density.temporal_prior import (
-    GuidedSimulation,
+    AdvectedDetail,
     NothingCarried,
     Start,
     TemporalPrior,
@@ -28,6 +28,7 @@ from smokelift.density.temporal_prior import (
 from smokelift.density.upright_plane import AxisEstimate
 
 __all__ = [
+    "AdvectedDetail",
     "AxisEstimate",
     "DensityFit",
     "DensitySettings",
@@ -37,7 +38,6 @@ __all__ = [
     "DetailedDepth",
     "FittedDensity",
     "GradientFit",
-    "GuidedSimulation",
     "NothingCarried",
     "Observation",
     "ObservedClip",

@@ -97,7 +97,7 @@ def clip_axis(clip: ObservedClip, distance: float | None = None) -> AxisEstimate
     camera, domain = seen[len(seen) // 2].camera, clip.optics.domain.with_at_most(MAX_VOXELS)
     optics = replace(clip.optics, domain=domain)
     thicknesses = [
-        np.where(matte(each.image, each.plate).mask, ObservedView.of(each, optics).optical_depth, np.float32(0))
+        np.where(matte(each.image, each.clean_plate).mask, ObservedView.of(each, optics).optical_depth, np.float32(0))
         for each in seen
     ]
     if distance is None and not any(each.any() for each in thicknesses):

@@ -1,6 +1,6 @@
 """What is assumed of the smoke's depth, which one picture leaves undetermined.
 
-`RoundDepth` takes the smoke to be as deep as it is wide. Its answer is smooth; the default, `DetailedDepth`, gives it
+`RoundDepth` takes the smoke to be as deep as it is wide. Its density is smooth; the default, `DetailedDepth`, gives it
 detail (`synthesis`). It spreads the smoke of one picture about an axis that comes from the whole clip: first as
 much as explains the picture without shadows, then as much as explains it in the shadows that this casts. With several
 pictures the density is the product of their depth profiles, scaled in each horizontal layer to the optical depth of the
@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 
 from smokelift.density.hull import Places, project_voxels
 from smokelift.density.levels import any_of_two, with_neighbors
-from smokelift.density.objective import Term
 from smokelift.density.observation import ObservedClip, ObservedView, ViewSet, shadowed_optical_depth
 from smokelift.density.profile import PROFILE_CUT, DepthProfile
 from smokelift.density.upright_plane import SmokeAxis, view_frame
@@ -36,20 +35,20 @@ there (docs/experiments/density-profile.md)."""
 class Detail(Protocol):
     """Detail that no camera shows, made up.
 
-    `smooth` (nx, ny, nz) is the density without it, which shows about what the pictures do.
+    `smooth_density` (nx, ny, nz) is the density without it, which shows about what the pictures do.
     """
 
     @property
-    def smooth(self) -> Volume: ...
+    def smooth_density(self) -> Volume: ...
 
-    def added(self, density: Volume, cameras: Sequence[Term], *, fresh: bool) -> Volume:
+    def added(self, density: Volume, *, fresh: bool) -> Volume:
         """Add detail to a density (nx, ny, nz), zero outside the hull, as far as the cameras' pictures allow.
 
         ``fresh`` says that nothing of the density is carried on from the frame before.
         """
 
     def low_pass(self, density: Volume) -> NDArray[np.float32]:
-        """What the smooth answer decides of a density: its blur over lobes, (n,) at the voxels that may hold smoke."""
+        """What the smooth density decides of a density: its blur over lobes, (n,) at the voxels that may hold smoke."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +57,7 @@ class DepthEstimate:
 
     density: Volume
     """(nx, ny, nz) float32: a plausible density that shows about what the pictures do; where a fit starts."""
-    inside: tuple[NDArray[np.float32], ...]
+    inside_fraction: tuple[NDArray[np.float32], ...]
     """tuple of (rows, columns): for each view, the fraction of every ray's smoke that lies inside the domain."""
     views: ViewSet
     """The pictures to fit, against the voxels where the prior expects smoke."""
@@ -99,7 +98,7 @@ class RoundDepth:
             if self.wander is not None:
                 scatter = self.wander.scatter(view.camera, views.optics.domain, views.frame)
             shadowed = views.optics.scattering in SHADOWED and views.hull.any()
-            if shadowed and view.before_darkness(views.optics.unshadowed_source()):
+            if shadowed and view.against_darkness(views.optics.unshadowed_source()):
                 views = replace(views, views=(self._in_its_shadows(view, views, scatter),))
         profiles = self._profiles(views, scatter)
         expected = replace(views, hull=_expected(views, profiles))

@@ -57,7 +57,7 @@ SHORTENINGS = 40
 def descend(
     terms: Sequence[Term],
     density: Volume,
-    hull: _core.MarkedVoxels,
+    where: _core.MarkedVoxels,
     iterations: int,
     tolerance: float,
     patience: int,
@@ -65,14 +65,15 @@ def descend(
     bound: float = np.inf,
     expected: Volume | None = None,
 ) -> Fit:
-    """Minimize the objective from a start (nx, ny, nz), in the voxels of the hull, which is the renderers' support.
+    """Minimize the objective from a start (nx, ny, nz), in the voxels ``where`` smoke may be: the renderers' support.
 
-    The result takes the start's place, which is zero outside the hull.
+    The result takes the start's place, which is zero outside them.
     It ends after so many iterations, or after ``patience`` steps in a row that each gain less than ``tolerance``, a
     fraction of the objective: one may gain little and the next much. No voxel exceeds ``bound``; the start is cut to
     it. ``expected`` (nx, ny, nz) bounds the scale of empty voxels, so that smoke fades where a prior expects none.
     """
-    where = hull if expected is None else hull.above_zero(density, expected)
+    if expected is not None:
+        where = where.above_zero(density, expected)
     current = where.take(density)
     np.minimum(current, np.float32(bound), out=current)
     floor = np.full(current.shape, FLOOR * current.mean() if current.size else 0, np.float32)

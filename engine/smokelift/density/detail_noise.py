@@ -1,4 +1,4 @@
-"""Noise that breaks the smooth answer's symmetry: as strong as the clip's own detail on every scale, and stretched.
+"""Noise that breaks the smooth density's symmetry: as strong as the clip's own detail on every scale, and stretched.
 
 Each octave is as strong as the clip's pictures are on its scale: turbulent smoke gets lobes, laminar smoke stays as it
 is. Each is read where random motion of the coarser octaves has taken it from: a flow draws smoke out into sheets and
@@ -46,7 +46,7 @@ def _sum(
     if level.coarser is not None:
         coarse, motions, octaves = _sum(level.coarser, moved, width, strengths, unread)
         for found, values in zip((noise, *motion), (coarse, *motions), strict=True):
-            found[...] = level.coarser.finer(level.coarser.views.volume(values), level)
+            found[...] = level.from_coarser(level.coarser.views.volume(values))
     middle = (size - 1) / 2 - moved
 
     def octave(blur: float, strength: float) -> NDArray[np.float32]:

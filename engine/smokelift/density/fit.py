@@ -20,7 +20,7 @@ from smokelift.density.descent import descend
 from smokelift.density.levels import BLUR_REACH
 from smokelift.density.multiplicative import fit_multiplicative
 from smokelift.density.objective import camera_terms
-from smokelift.density.observation import BLACK, Observation, ViewSet, eight_bit_plate
+from smokelift.density.observation import Observation, ViewSet, eight_bit_plate
 from smokelift.extraction.element import extract_element, shows_transmittance, usual_source
 from smokelift.extraction.given_background import backdrop_color, background_picture
 from smokelift.extraction.plate import Plate
@@ -48,8 +48,8 @@ class DensitySettings:
     Attributes
     ----------
     fit_iterations
-        Multiplicative iterations at most, for each view; the fit is within a few per cent after six, and each further
-        one gains less than a step of descent costs.
+        Multiplicative iterations at most, for each view, and twice as many where made-up detail is all new; the fit is
+        within a few per cent after six, and each further one gains less than a step of descent costs.
     descent_iterations
         Steps of descent at most.
     tolerance
@@ -79,7 +79,8 @@ class FittedDensity:
     ----------
     density : (nx, ny, nz) float32
     hull : (nx, ny, nz) bool
-        Voxels that the pictures allow to hold smoke and in which the depth prior expects any.
+        Voxels that the fit could fill: those that the pictures allow to hold smoke and in which the depth prior expects
+        any. All of them by the paper's method; none in a frame that shows nothing of the domain.
     figures
         ``loss`` (sum of squared differences over all cameras' pictures) and ``psnr`` (dB, peak 1) of the input's
         picture as its view has it, in linear radiance, over the pixels that its smoke's voxels can change, all alike;
@@ -87,9 +88,9 @@ class FittedDensity:
         root mean square of the input's differences over that of what changes there, with what its element leaves out as
         no smoke in both: 1 if nothing is fitted, however faint the smoke; ``iterations``; ``hull_share``, the hull's
         fraction of the voxels.
-    smooth : (nx, ny, nz) float32, optional
-        The density without what the depth prior makes up (`Detail.smooth`); None if that is all of it.
-    steady : (nx, ny, nz) float32, optional
+    smooth_density : (nx, ny, nz) float32, optional
+        The density without made-up detail (`Detail.smooth_density`); None if nothing was made up.
+    for_advection : (nx, ny, nz) float32, optional
         The density that a next frame carries along; None if that is `density`. It has what the descent changes from
         some voxels to the next, but not in single ones: that would pile up along the rays from frame to frame.
     """
@@ -97,8 +98,8 @@ class FittedDensity:
     density: Volume
     hull: NDArray[np.bool_]
     figures: Mapping[str, float] = field(default_factory=dict)
-    smooth: Volume | None = None
-    steady: Volume | None = None
+    smooth_density: Volume | None = None
+    for_advection: Volume | None = None
 
 
 class DensityFit(Protocol):
@@ -130,14 +131,14 @@ class GradientFit:
         hull, where = views.hull, views.where
         if not where.count:
             return empty_density(views)
-        cameras = camera_terms(views, depth.inside)
+        cameras = camera_terms(views, depth.inside_fraction)
         start, fresh = views.volume(where.take(depth.density if initial is None else initial)), initial is None
         # The terms take turns, so several cameras need as many times more iterations.
         iterations = settings.fit_iterations * len(cameras)
         plausible = smooth = None
         if depth.detail is not None:
-            plausible, smooth = depth.density, depth.detail.smooth
-            start = depth.detail.added(start, cameras, fresh=fresh)
+            plausible, smooth = depth.density, depth.detail.smooth_density
+            start = depth.detail.added(start, fresh=fresh)
             iterations *= 1 + fresh  # detail that is all new is far from the pictures
         scaled = fit_multiplicative(cameras, start, iterations, settings.tolerance, where, plausible)
         expected, started = (float(where.take(values).max()) for values in (depth.density, start))
@@ -155,12 +156,12 @@ class GradientFit:
             expected=prior,
         )
         figures = fit_figures(views, final.residuals, scaled.iterations + final.iterations)
-        steady = None
+        for_advection = None
         if smooth is not None:
-            steady = views.volume(began)
+            for_advection = views.volume(began)
             if final.iterations:
-                steady = _without_single_voxels(steady, final.density, hull)
-        return FittedDensity(without_traces(final.density, where), hull, figures, smooth, steady)
+                for_advection = _without_single_voxels(for_advection, final.density, hull)
+        return FittedDensity(without_traces(final.density, where), hull, figures, smooth, for_advection)
 
 
 def reconstruct_density(
@@ -219,7 +220,7 @@ def reconstruct_density(
     require_kind(settings, DensitySettings | None, "settings", "DensitySettings (settings.density of a run's)")
     views = listed(views, Observation, "views", "a list of Observations")
     optics = scene_optics(complete)
-    own = Observation(complete.camera, image, BLACK if plate is None else plate)
+    own = Observation(complete.camera, image, plate)
     seen = ViewSet.of([_with_plate(each, complete) for each in (own, *views)], optics)
     if initial is not None:
         initial = _checked_initial(initial, optics.domain)
@@ -233,11 +234,10 @@ def _with_plate(observation: Observation, scene: CompleteScene) -> Observation:
 
     Before a picture that shows how much of it smoke lets through, its smoke is extracted.
     """
-    camera = observation.camera
-    if observation.plate is BLACK:
+    camera, picture, plate = observation.camera, observation.image, observation.plate
+    if plate is None:
         plate = eight_bit_plate(background_picture(scene, camera), camera.size)
         observation = replace(observation, plate=plate)
-    picture, plate = observation.image, observation.plate
     if observation.element is not None or backdrop_color(plate.image) is not None:
         return observation
     source = usual_source([(picture, plate)], camera.size)

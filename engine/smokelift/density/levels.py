@@ -39,11 +39,12 @@ their middles, have a variance of 11/12 of a finer voxel. So a blur there is 5 %
 class Level:
     """A pyramid level: a moment on one grid, whose voxels are each `coarseness` voxels of the finest grid wide.
 
-    `inside` has a picture (rows, columns) for each view: the fraction of every ray's smoke that lies inside the domain.
+    `inside_fraction` has a picture (rows, columns) for each view: the fraction of every ray's smoke that lies inside
+    the domain. What involves the coarser level may be asked only where there is one.
     """
 
     views: ViewSet
-    inside: tuple[NDArray[np.float32], ...]
+    inside_fraction: tuple[NDArray[np.float32], ...]
     coarseness: int = 1
 
     @cached_property
@@ -55,33 +56,33 @@ class Level:
         optics = replace(views.optics, domain=views.optics.domain.coarser(2))
         seen = tuple(view.coarser(optics) for view in views.views)
         inside = tuple(
-            area_average(fraction, *view.camera.size) for fraction, view in zip(self.inside, seen, strict=True)
+            area_average(fraction, *view.camera.size) for fraction, view in zip(self.inside_fraction, seen, strict=True)
         )
         return Level(ViewSet(seen, any_of_two(views.hull), optics, views.frame), inside, 2 * self.coarseness)
 
     def terms(self) -> list[Term]:
         """Terms of the cameras' pictures; see `camera_terms`."""
-        return camera_terms(self.views, self.inside)
+        return camera_terms(self.views, self.inside_fraction)
 
-    def finer(self, values: Volume, of: Level) -> NDArray[np.float32]:
-        """Values of this grid at the voxels (n,) that may hold smoke on the next finer one, linear between middles."""
-        fine, box = self._boxes(of)
-        return _core.prolong_values(values[box], of.views.hull[fine])
+    def from_coarser(self, values: Volume) -> NDArray[np.float32]:
+        """Values of the coarser grid at this one's voxels (n,) that may hold smoke, linear between middles."""
+        fine, coarse = self._boxes()
+        return _core.prolong_values(values[coarse], self.views.hull[fine])
 
-    def changed(self, density: Volume, of: Level, change: Callable[[Volume], Volume]) -> Volume:
-        """A density of the next finer grid, changed as `change` changes its means on this grid."""
-        fine, box = self._boxes(of)
-        means = self.means(density, of)
+    def changed_on_coarser(self, density: Volume, change: Callable[[Volume], Volume]) -> Volume:
+        """A density of this grid, changed as `change` changes its means on the coarser grid."""
+        fine, coarse = self._boxes()
+        means = self.coarse_means(density)
         after = change(means)
         result = np.zeros(density.shape, np.float32)
-        _core.scale_alike(density[fine], of.views.hull[fine], means[box], after[box], float(TINY), result[fine])
+        _core.scale_alike(density[fine], self.views.hull[fine], means[coarse], after[coarse], float(TINY), result[fine])
         return result
 
-    def means(self, density: Volume, of: Level) -> Volume:
-        """Means of a density of the next finer grid on this one."""
-        fine, box = self._boxes(of)
-        means = np.zeros(self.views.hull.shape, np.float32)
-        means[box] = _core.means_of_two(density[fine], of.views.hull[fine])
+    def coarse_means(self, density: Volume) -> Volume:
+        """Means of a density of this grid on the coarser one."""
+        fine, coarse = self._boxes()
+        means = np.zeros(self._coarse.views.hull.shape, np.float32)
+        means[coarse] = _core.means_of_two(density[fine], self.views.hull[fine])
         return means
 
     def blurred(self, values: Volume, deviation: float) -> NDArray[np.float32]:
@@ -92,18 +93,24 @@ class Level:
         box = box_around(self.views.hull, round(BLUR_REACH * deviation))
         return _blurred(values[box], self.views.hull[box], deviation)
 
+    @property
+    def _coarse(self) -> Level:
+        """The coarser level, where there is one."""
+        assert self.coarser is not None
+        return self.coarser
+
     @cached_property
     def _box(self) -> tuple[slice, slice, slice]:
         """The box around the smoke."""
         return box_around(self.views.hull, 0)
 
-    def _boxes(self, of: Level) -> tuple[tuple[slice, ...], tuple[slice, ...]]:
-        """The box around the smoke on the finer grid and on this one."""
-        shape = of.views.hull.shape
+    def _boxes(self) -> tuple[tuple[slice, ...], tuple[slice, ...]]:
+        """The box around the smoke on this grid and on the coarser one."""
+        coarse, shape = self._coarse._box, self.views.hull.shape
         fine = tuple(
-            slice(2 * span.start, min(2 * span.stop, count)) for span, count in zip(self._box, shape, strict=True)
+            slice(2 * span.start, min(2 * span.stop, count)) for span, count in zip(coarse, shape, strict=True)
         )
-        return fine, self._box
+        return fine, coarse
 
 
 def _blurred(values: Volume, marked: NDArray[np.bool_], deviation: float) -> NDArray[np.float32]:

@@ -93,17 +93,16 @@ def fit_multiplicative(
     return Fit(smoke.volume_of(best), least, left, done)
 
 
-def take_turns(terms: Sequence[Term], density: Volume, rounds: int, where: _core.MarkedVoxels) -> Volume:
+def take_turns(terms: Sequence[Term], density: Volume, where: _core.MarkedVoxels) -> Volume:
     """Scale the smoke of every ray towards each picture in turn, whatever the others lose by it.
 
-    Each term has as many turns as there are rounds; the last one is fitted best. Only voxels of ``where`` that are not
-    zero at the start (nx, ny, nz) change.
+    Each term has one turn; the last one is fitted best. Only voxels of ``where`` that are not zero at the start
+    (nx, ny, nz) change.
     """
     smoke = _Smoke(density, where)
     values = smoke.values
-    for _ in range(rounds):
-        for turn, term in enumerate(terms):
-            values = _scaled(smoke, values, turn, term, term.renderer.image(smoke.volume_of(values)), {}, values)
+    for turn, term in enumerate(terms):
+        values = _scaled(smoke, values, turn, term, term.renderer.image(smoke.volume_of(values)), {}, values)
     return smoke.volume_of(values)
 
 

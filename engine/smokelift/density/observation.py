@@ -73,10 +73,6 @@ def eight_bit_plate(background: Image, size: tuple[int, int]) -> Plate:
     return Plate(picture, np.ones((height, width), np.float32), EIGHT_BIT_NOISE)
 
 
-BLACK = eight_bit_plate(np.zeros(3, np.float32), (1, 1))
-"""Stands for a black plate of any size (by definition)."""
-
-
 @dataclass(frozen=True, eq=False)
 class Observation:
     """One camera's picture of the smoke at one moment.
@@ -88,8 +84,8 @@ class Observation:
     image : (rows, columns, 3)
         Linear radiance, of the camera's size.
     plate
-        The clean plate: what the camera sees without smoke, with the noise of its pictures. By default black with the
-        noise of 8 bits, for which `reconstruct_density` substitutes the scene's background.
+        The clean plate: what the camera sees without smoke, with the noise of its pictures. None stands for black with
+        the noise of 8 bits (`clean_plate`), and in `reconstruct_density` for the scene's background.
     element
         The smoke without the plate; None where the picture itself tells as much, as before black or one color.
 
@@ -101,13 +97,18 @@ class Observation:
 
     camera: Camera
     image: Image
-    plate: Plate = BLACK
+    plate: Plate | None = None
     element: Element | None = None
 
     def __post_init__(self) -> None:
         require_kind(self.camera, Camera, "camera", "a Camera")
-        require_kind(self.plate, Plate, "plate", "a Plate (a known picture is the scene's background)")
+        require_kind(self.plate, Plate | None, "plate", "a Plate (a known picture is the scene's background)")
         object.__setattr__(self, "image", radiance(self.image, "The picture"))
+
+    @property
+    def clean_plate(self) -> Plate:
+        """The plate, or a black one in its place."""
+        return eight_bit_plate(np.zeros(3, np.float32), self.camera.size) if self.plate is None else self.plate
 
 
 class ObservedClip(Protocol):
@@ -172,9 +173,7 @@ class ObservedView:
     @staticmethod
     def of(observation: Observation, optics: Optics) -> ObservedView:
         """Set an observation against the grid of `optics.domain`."""
-        camera, plate = observation.camera, observation.plate
-        if plate is BLACK:
-            plate = eight_bit_plate(np.zeros(3, np.float32), camera.size)
+        camera, plate = observation.camera, observation.clean_plate
         probability = matte(observation.image, plate).probability
         if observation.element is None:
             image, background, noise = observation.image, plate.image, noise_at(observation.image, plate)
@@ -196,7 +195,7 @@ class ObservedView:
             self.camera.resized(columns, rows), image, background, noise, left_out, probability, optics
         )
 
-    def before_darkness(self, source: NDArray[np.float64]) -> bool:
+    def against_darkness(self, source: NDArray[np.float64]) -> bool:
         """Whether the background is dark beside a source radiance (3,) wherever smoke shows."""
         return bool((self.background[self.mask] <= MAX_DARK_RADIANCE * _in_channels(source, self.background)).all())
 
@@ -210,7 +209,8 @@ class ObservedView:
 class ViewSet:
     """All views of one moment, the input's first.
 
-    `hull` (nx, ny, nz) marks the voxels that all of them allow to hold smoke. `frame` is the number of the moment in
+    `hull` (nx, ny, nz) marks the voxels that may hold smoke: those that all of them allow, or fewer where a depth prior
+    expects none (`DepthEstimate.views`). `frame` is the number of the moment in
     its clip, from 0: a depth prior that has seen the clip knows the other moments.
     """
 

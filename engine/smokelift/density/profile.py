@@ -10,7 +10,7 @@ deviation sigma, A = sigma sqrt(Gamma(1/q) / Gamma(3/q)). sigma is the geometric
 shows. One is the least spread of the smoke along any line through the pixel: across a column or a jet wherever it
 goes, upright, lying or bent, and through a ball as long as the ray's way in it. The other is the width of balls that
 fill the silhouette (inflated outlines: Igarashi, Matsuoka and Tanaka 1999). In true smoke dark rays are longer than
-thin ones, by which a smooth answer gains nothing (docs/experiments/density-profile.md).
+thin ones, by which a smooth density gains nothing (docs/experiments/density-profile.md).
 
 What stands nearer to the camera than the axis shows beyond the domain's ends there. The domain holds all smoke that a
 density can have, so a ray's middle is moved into it, and its profile is narrower by as much: it reaches no farther from
@@ -24,7 +24,14 @@ from scipy.special import gamma, gammainc
 
 import smokelift._core as _core
 from smokelift.density.hull import Places
-from smokelift.density.upright_plane import TINY, PlanePicture, PlaneRays, SmokeAxis, on_upright_plane, view_frame
+from smokelift.density.upright_plane import (
+    TINY_DOUBLE,
+    PlanePicture,
+    PlaneRays,
+    SmokeAxis,
+    on_upright_plane,
+    view_frame,
+)
 from smokelift.density.wander import Scatter
 from smokelift.scene import Camera, Domain
 
@@ -96,7 +103,7 @@ def _spread_along(plane: PlanePicture, turn: float, voxel_size: float) -> NDArra
     total, first, second = (np.bincount(line.ravel(), (plane.values * along**power).ravel()) for power in range(3))
     # normalized convolution: lines count by the smoke that they hold
     most = total.max(initial=0.0)
-    squares = np.maximum(second - first**2 / np.maximum(total, TINY), 0)
+    squares = np.maximum(second - first**2 / np.maximum(total, TINY_DOUBLE), 0)
     weight = ndimage.gaussian_filter1d(total, LINE_SMOOTHING) + 1e-6 * max(most, 1e-30)
     variance = ndimage.gaussian_filter1d(squares, LINE_SMOOTHING) / weight
     known = np.flatnonzero(total > 1e-3 * most)

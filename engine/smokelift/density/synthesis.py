@@ -1,10 +1,10 @@
 """Detail in depth: smoke that looks like the clip from every side.
 
-The smooth answer of `RoundDepth` is the mean of all smokes that show one picture: from the side, a spindle without
+The smooth density of `RoundDepth` is the mean of all smokes that show one picture: from the side, a spindle without
 detail. A plausible smoke shows from every side what the clip shows from the front: not one of its pictures, but the
 distribution of their patches (`texture`). Noise breaks the spindle's symmetry (`detail_noise`). Then, from coarse
 to fine, pictures of the smoke from many azimuths are moved towards that distribution, and the smoke is scaled along
-their rays to follow. The rows of every picture keep the amounts of the smooth answer. After each round the cameras'
+their rays to follow. The rows of every picture keep the amounts of the smooth density. After each round the cameras'
 pictures have their turn. Smoke carried on from the frame before has the clip's statistics already: one round is enough.
 """
 
@@ -23,7 +23,6 @@ from smokelift.density.depth_prior import DepthEstimate, RoundDepth
 from smokelift.density.detail_noise import stretched_noise
 from smokelift.density.levels import TINY, Level
 from smokelift.density.multiplicative import fit_multiplicative, take_turns
-from smokelift.density.objective import Term
 from smokelift.density.observation import ObservedClip, ViewSet
 from smokelift.density.texture import ClipTexture, Exemplar, Picture, enlarged
 from smokelift.density.turntable import Turntable, UprightSmoke
@@ -34,18 +33,18 @@ from smokelift.scene.domain import box_around
 from smokelift.transport import block_means
 
 SMOOTH_ITERATIONS = 4
-"""Multiplicative iterations for the smooth answer, whose amounts the sides' rows keep."""
+"""Multiplicative iterations for the smooth density, whose amounts the sides' rows keep."""
 
 SMOOTH_TOLERANCE = 0.02
 """Fraction of the objective that each has to gain for another to follow, as in the fit."""
 
 LOW_PASS = 0.75
-"""Standard deviation of a blur, in those of the smoke's width. Noisy and carried smoke, blurred, is the smooth answer,
+"""Standard deviation of a blur, in those of the smoke's width. Noisy and carried smoke, blurred, is the smooth density,
 blurred: lobes are made up, on any grid, and the smoke of each stays where it is
 (docs/experiments/temporal-prior.md, docs/experiments/made-up-detail.md)."""
 
-LARGEST_GAIN = 5.0
-"""Bound of the factor that gives noisy smoke the smooth answer's low pass."""
+MAX_NOISE_GAIN = 5.0
+"""Bound of the factor that gives noisy smoke the smooth density's low pass."""
 
 FRESH_ROUNDS = 4
 """Rounds on each scale for smoke that carries nothing on."""
@@ -61,19 +60,19 @@ FRESH_STEP, CARRIED_STEP = 0.6, 0.5
 flickers (docs/experiments/every-view.md)."""
 
 GAIN = (np.pi / 2) ** 0.5
-"""Root of one over the mean sine of all angles, so that a picture whose detail has no direction keeps its energy when
-its layers are taken out (docs/experiments/every-view.md)."""
+"""1/sqrt(mean sine over all angles): the filter keeps the energy of isotropic detail
+(docs/experiments/every-view.md)."""
 
 STEP_RANGE = (0.3, 3.0)
 """Smallest and largest factor on a ray's smoke in one step."""
 
 ROW_RANGE = (0.5, 2.0)
-"""Smallest and largest factor that gives a row of a picture the smooth answer's amount
+"""Smallest and largest factor that gives a row of a picture the smooth density's amount
 (docs/experiments/made-up-detail.md)."""
 
 OUTLINE = 0.02
-"""Fraction of the largest optical depth of the smooth answer, blurred, below which a picture's smoke fades. So it stays
-within the outline that the smooth answer has from there (docs/experiments/made-up-detail.md)."""
+"""Fraction of the largest optical depth of the smooth density, blurred, below which a picture's smoke fades. So it
+stays within the outline that the smooth density has from there (docs/experiments/made-up-detail.md)."""
 
 OUTLINE_BLUR = 3.0
 """Standard deviation (voxels) of the blur that `OUTLINE` is measured on."""
@@ -83,8 +82,8 @@ OUTLINE_BLUR = 3.0
 class DetailedDepth:
     """Round smoke with detail; see the module.
 
-    `smooth` is the prior of the smooth answer, `detail` the strength, above 0 and up to 1. Another `seed` makes another
-    plausible smoke of the same clip. Without a `texture` there is no detail.
+    `smooth` is the prior of the smooth density, `detail` the strength, above 0 and up to 1. Another `seed` makes
+    another plausible smoke of the same clip. Without a `texture` there is no detail.
     """
 
     smooth: RoundDepth
@@ -102,14 +101,14 @@ class DetailedDepth:
         return replace(self, smooth=smooth, texture=texture)
 
     def estimate(self, views: ViewSet) -> DepthEstimate:
-        """The smooth answer with noise, and the detail that gives it the clip's texture."""
+        """The smooth density with noise, and the detail that gives it the clip's texture."""
         estimate = self.smooth.estimate(views)
-        level = Level(estimate.views, estimate.inside)
+        level = Level(estimate.views, estimate.inside_fraction)
         if self.texture is None or not level.views.hull.any():
             return estimate
         if not unseen_sides(self.texture.turntable, [view.camera for view in views.views]):
             return estimate
-        smooth = _smooth_answer(level, estimate.density)
+        smooth = _smooth_density(level, estimate.density)
         return replace(
             estimate,
             density=self._noisy(smooth, level, self.texture),
@@ -117,7 +116,7 @@ class DetailedDepth:
         )
 
     def _noisy(self, smooth: Volume, level: Level, texture: ClipTexture) -> Volume:
-        """The smooth answer with noise that travels with the smoke; its low pass stays."""
+        """The smooth density with noise that travels with the smoke; its low pass stays."""
         moved = texture.turntable.height * texture.drift * level.views.frame
         values = stretched_noise(level, moved, texture.width, texture.roughness, self.seed)
         np.exp(values, out=values)
@@ -127,30 +126,30 @@ class DetailedDepth:
         gain += TINY
         now += TINY
         gain /= now
-        values *= np.minimum(gain, np.float32(LARGEST_GAIN), out=gain)
+        values *= np.minimum(gain, np.float32(MAX_NOISE_GAIN), out=gain)
         level.views.where.put(values, noisy)
         return noisy
 
 
-def _smooth_answer(level: Level, density: Volume) -> Volume:
+def _smooth_density(level: Level, density: Volume) -> Volume:
     """A density in the amounts that the cameras' pictures show, found on the coarsest grid."""
     coarser = level.coarser
     if coarser is None:
         fitted = fit_multiplicative(level.terms(), density, SMOOTH_ITERATIONS, SMOOTH_TOLERANCE, level.views.where)
         return fitted.density
-    return coarser.changed(density, level, lambda means: _smooth_answer(coarser, means))
+    return level.changed_on_coarser(density, lambda means: _smooth_density(coarser, means))
 
 
 @dataclass(frozen=True, eq=False)
 class EveryView:
-    """Makes the smoke of a moment look like the clip from every side, from a smooth answer (nx, ny, nz).
+    """Makes the smoke of a moment look like the clip from every side, from a smooth density (nx, ny, nz).
 
     `strength` is from 0 to 1.
     """
 
     texture: ClipTexture
     level: Level
-    smooth: Volume
+    smooth_density: Volume
     strength: float
 
     @cached_property
@@ -160,40 +159,30 @@ class EveryView:
         if coarser is None or len(texture.exemplars) == 1:
             return None
         texture = texture.halved(coarser.views.optics.domain)
-        return EveryView(texture, coarser, coarser.means(self.smooth, self.level), self.strength)
+        return EveryView(texture, coarser, self.level.coarse_means(self.smooth_density), self.strength)
 
-    def added(self, density: Volume, cameras: Sequence[Term], *, fresh: bool) -> Volume:
+    def added(self, density: Volume, *, fresh: bool) -> Volume:
         """Scale a density towards the clip's texture and the cameras' pictures in turn; see `Detail`."""
-        return self._rounds(density, cameras, self.azimuths(), fresh)
+        return self._rounds(density, self.azimuths(), fresh)
 
     def low_pass(self, density: Volume) -> NDArray[np.float32]:
         """The density (n,) blurred over lobes of smoke; see `Detail`."""
         return self.level.blurred(density, LOW_PASS * self.texture.width)
 
-    def _rounds(
-        self,
-        density: Volume,
-        cameras: Sequence[Term],
-        azimuths: Iterator[tuple[int, float]],
-        fresh: bool,
-    ) -> Volume:
-        """The rounds of all scales; those that a coarser grid holds are done there."""
+    def _rounds(self, density: Volume, azimuths: Iterator[tuple[int, float]], fresh: bool) -> Volume:
+        """The rounds of all scales; those that a coarser grid holds are done there, with the first of the azimuths."""
         coarser, exemplars = self.coarser, self.texture.exemplars
         if coarser is not None:
-            density = coarser.level.changed(
-                density,
-                self.level,
-                lambda means: coarser._rounds(means, coarser.level.terms(), azimuths, fresh),
-            )
+            density = self.level.changed_on_coarser(density, lambda means: coarser._rounds(means, azimuths, fresh))
             exemplars = tuple(exemplar for exemplar in exemplars if exemplar.scale == 1)
         if not exemplars:
             return density
-        table, hull = self.texture.turntable, self.level.views.hull
+        cameras, table, hull = self.level.terms(), self.texture.turntable, self.level.views.hull
         box = list(box_around(hull, 0))
         box[table.axis] = slice(None)  # rays turn about the axis, along which all of the grid stays
         part = tuple(box)
         first, second = (span.start for span in part if span != slice(None))
-        smooth = UprightSmoke.of(table, table.upright(self.smooth[part]), (first, second))
+        smooth = UprightSmoke.of(table, table.upright(self.smooth_density[part]), (first, second))
         relaxation = self.strength * (FRESH_STEP if fresh else CARRIED_STEP)
         for exemplar in exemplars:
             for _ in range(FRESH_ROUNDS if fresh else 1):
@@ -202,7 +191,7 @@ class EveryView:
                     self._step(turned, smooth, exemplar, next(azimuths), relaxation)
                 changed = np.zeros(hull.shape, np.float32)
                 np.copyto(changed[part], table.lying(turned.values), where=hull[part])
-                density = take_turns(cameras, changed, 1, self.level.views.where)
+                density = take_turns(cameras, changed, self.level.views.where)
         return density
 
     def _step(

@@ -1,9 +1,9 @@
 """Where the fit of a frame starts, from the depth prior's density and the one carried along from the frame before.
 
 The carried (advected) density has structures along the rays, and optical depths that the renderer has corrected for
-shadows already. Smoke with made-up detail is a simulation that the clip guides: the detail of the frame before moves on
-with the flow, and the smooth answer of the new picture says how much smoke is where. A velocity of its own, which
-nothing guides along the rays, makes more lobes there and worse jets (docs/experiments/wander.md).
+shadows already. Made-up detail of the frame before moves on with the flow, and the smooth density of the new picture
+says how much smoke is where. A velocity of its own, which nothing guides along the rays, makes more lobes there and
+worse jets (docs/experiments/wander.md).
 
 Of smoke without such detail a constant fraction is blended in. Of an error that no picture corrects, in thick smoke, in
 shadow or of the velocity, a frame takes over no more than that fraction, so none grows from frame to frame
@@ -18,11 +18,10 @@ import numpy as np
 
 from smokelift.density.depth_prior import DepthEstimate
 from smokelift.density.levels import TINY
-from smokelift.density.observation import ViewSet
 from smokelift.render import Volume
 
-LARGEST_GAIN = 1.5
-"""Bound of the factor that makes a carried smooth answer denser. Where that is too little the prior's smoke is added:
+MAX_ADVECTED_GAIN = 1.5
+"""Bound of the factor that makes a carried smooth density denser. Where that is too little the prior's smoke is added:
 there smoke has entered, or has moved otherwise than was predicted (docs/experiments/every-view.md)."""
 
 RETENTION = 0.97
@@ -40,19 +39,17 @@ class Start:
 class TemporalPrior(Protocol):
     """What is taken over from the frame before."""
 
-    def start(self, views: ViewSet, depth: DepthEstimate, carried: Volume, smooth: Volume) -> Start:
+    def start(self, depth: DepthEstimate, carried: Volume, smooth: Volume) -> Start:
         """Where the fit starts.
 
         Parameters
         ----------
-        views
-            The pictures of the frame.
         depth
-            What the depth prior says of them.
+            What the depth prior says of the frame's pictures.
         carried : (nx, ny, nz)
             The density of the frame before, carried along by the predicted velocity.
         smooth : (nx, ny, nz)
-            Its smooth answer, carried alike; the same as ``carried`` if nothing was made up.
+            Its smooth density, carried alike; the same as ``carried`` if nothing was made up.
         """
 
 
@@ -60,43 +57,44 @@ class TemporalPrior(Protocol):
 class NothingCarried:
     """Every frame starts from its own pictures."""
 
-    def start(self, views: ViewSet, depth: DepthEstimate, carried: Volume, smooth: Volume) -> Start:
+    def start(self, depth: DepthEstimate, carried: Volume, smooth: Volume) -> Start:
         """The depth prior's density; see `TemporalPrior`."""
         return Start(depth.density, {})
 
 
 @dataclass(frozen=True)
-class GuidedSimulation:
-    """The detail of the carried density, with the low pass of the depth prior's smooth answer.
+class AdvectedDetail:
+    """The detail of the carried density, with the low pass of the depth prior's smooth density.
 
-    With B the blur over lobes (`Detail.low_pass`), the smooth answer rho_s, the prior's density rho_p, the carried one
-    rho_c and its smooth answer sigma_c:
+    With B the blur over lobes (`Detail.low_pass`), the smooth density rho_s, the prior's density rho_p, the carried one
+    rho_c and its smooth density sigma_c:
 
-        start = r rho_c B(k rho_s) / B(rho_c) + (1 - r k) rho_p,   k = min(1, LARGEST_GAIN sigma_c / rho_s)
+        start = r rho_c B(k rho_s) / B(rho_c) + (1 - r k) rho_p,   k = min(1, MAX_ADVECTED_GAIN sigma_c / rho_s)
 
-    Detail is born where nothing is carried, at inlets above all, and moves on from there; r is `RETENTION`. How much
-    is, k, the smooth answers say voxel by voxel: what enters in a frame is thinner than a lobe, and blurred it would
-    look carried.
-    Where the depth prior makes nothing up, the start is (1 - blend) rho_p + blend rho_c.
+    Detail is born where nothing is carried, at inlets above all, and moves on from there; r is `RETENTION`. k is taken
+    voxel by voxel: entering smoke is thinner than a lobe, and blurred would look carried. Where the depth prior makes
+    nothing up, the start is (1 - blend) rho_p + blend rho_c.
     """
 
     blend: float
 
-    def start(self, views: ViewSet, depth: DepthEstimate, carried: Volume, smooth: Volume) -> Start:
-        """The carried density with the smooth answer's low pass; see `TemporalPrior`.
+    def start(self, depth: DepthEstimate, carried: Volume, smooth: Volume) -> Start:
+        """The carried density with the smooth density's low pass; see `TemporalPrior`.
 
-        Its figure ``share`` is the fraction of the smoke that is.
+        Its figure ``share`` is the carried fraction of the mass.
         """
-        prior, detail, where = depth.density, depth.detail, views.where
+        prior, detail, views = depth.density, depth.detail, depth.views
+        where = views.where
         if detail is None or not where.count:
             blend = self.blend if prior.any() and carried.any() else 0.0
             return Start(np.float32(1 - blend) * prior + np.float32(blend) * carried, {"share": blend})
-        wanted, came = where.take(detail.smooth), where.take(smooth)
-        came *= np.float32(LARGEST_GAIN)
-        np.minimum(came, wanted, out=came)
-        reached = np.float32(RETENTION) * detail.low_pass(views.volume(came))
-        taken_over = where.take(carried) * reached / np.maximum(detail.low_pass(carried), TINY)
-        started = taken_over + (1 - np.float32(RETENTION) * came / np.maximum(wanted, TINY)) * where.take(prior)
+        base, advected_base = where.take(detail.smooth_density), where.take(smooth)
+        advected_base *= np.float32(MAX_ADVECTED_GAIN)
+        np.minimum(advected_base, base, out=advected_base)
+        target_low_pass = np.float32(RETENTION) * detail.low_pass(views.volume(advected_base))
+        taken_over = where.take(carried) * target_low_pass / np.maximum(detail.low_pass(carried), TINY)
+        renewed = 1 - np.float32(RETENTION) * advected_base / np.maximum(base, TINY)
+        started = taken_over + renewed * where.take(prior)
         total = float(started.sum(dtype=np.float64))
         fraction = float(taken_over.sum(dtype=np.float64)) / total if total > 0 else 0.0
         return Start(views.volume(started), {"share": fraction})

@@ -152,7 +152,7 @@ def _on_screens(
     found = []
     for camera, optical_depth in seen:
         if optical_depth.any():
-            turntable = Turntable.before(camera, domain, axis)
+            turntable = Turntable.facing(camera, domain, axis)
             picture = turntable.screen(optical_depth, camera)
             if picture.any():
                 found.append(_Shown(turntable, picture))

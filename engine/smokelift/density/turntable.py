@@ -33,8 +33,8 @@ class Turntable:
     domain: Domain
 
     @staticmethod
-    def before(camera: Camera, domain: Domain, axis: int | None = None) -> Turntable:
-        """Put a domain before a camera, on the given axis of the grid or the one nearest to the view's height."""
+    def facing(camera: Camera, domain: Domain, axis: int | None = None) -> Turntable:
+        """Put a domain in front of a camera, on the given axis of the grid or the one nearest to the view's height."""
         _, depth, up = view_frame(camera)
         axis = int(np.argmax(np.abs(up))) if axis is None else axis
         height = np.zeros(3)

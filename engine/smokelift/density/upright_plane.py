@@ -17,7 +17,7 @@ from smokelift.checks import Doubles
 from smokelift.scene import Camera, Domain
 from smokelift.scene.projection import project_points, ray_through_pixels
 
-TINY = np.finfo(np.float64).tiny
+TINY_DOUBLE = np.finfo(np.float64).tiny
 """Smallest normal number, for divisions."""
 
 MIN_ALONG = 1e-3
@@ -102,13 +102,13 @@ class PlanePicture:
     @property
     def mean(self) -> Doubles:
         """Mean lateral position (n,) in each row (m): 0 where there is nothing."""
-        return np.asarray(self.values @ self.laterals / np.maximum(self.total, TINY))
+        return np.asarray(self.values @ self.laterals / np.maximum(self.total, TINY_DOUBLE))
 
     @property
     def spread(self) -> Doubles:
         """Lateral standard deviation (n,) in each row (m): 0 where there is nothing."""
         squares = (self.laterals - self.mean[:, None]) ** 2
-        return np.asarray(np.sqrt((self.values * squares).sum(1) / np.maximum(self.total, TINY)))
+        return np.asarray(np.sqrt((self.values * squares).sum(1) / np.maximum(self.total, TINY_DOUBLE)))
 
     def read(self, heights: Doubles, laterals: Doubles) -> Doubles:
         """Values at some heights and lateral places, linear between the pixels; the nearest beyond the ends."""

@@ -22,7 +22,7 @@ class Orbit:
     """
 
     def __init__(self, scene: CompleteScene, *, lights_turn: bool = False) -> None:
-        self.table = Turntable.before(scene.camera.at(0), scene.domain)
+        self.table = Turntable.facing(scene.camera.at(0), scene.domain)
         self._optics = scene_optics(scene)
         self._shines = scene.scattering != "absorption" and bool(self._optics.unshadowed_source().max() > 0)
         self._lights_turn = lights_turn

@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 
 from smokelift.checks import Mask
-from smokelift.extraction.background_kind import MAX_DEVIATION, color_around, likeliest, within
+from smokelift.extraction.background_kind import MAX_DEVIATION, color_around, likeliest_background, within
 from smokelift.extraction.camera_motion import CameraMotion, Texture, find_motion, motion_before
 from smokelift.extraction.clear_picture import ClearPicture, clear_picture, spread_out, whole_plate
 from smokelift.extraction.given_background import mean_of_frames, read_background
@@ -66,7 +66,7 @@ class Backdrop:
     camera is known to move."""
     frames: int = 0
     """Number of the file's frames, up to the next cut, that it was estimated from."""
-    shot: tuple[int, int] | None = None
+    uncut_span: tuple[int, int] | None = None
     """First and last of these in the file; None where it was not estimated from frames."""
     cut: tuple[int, int] | None = None
     """Frames of the file before and after a cut within the clip, if there is one."""
@@ -75,9 +75,9 @@ class Backdrop:
     motion: CameraMotion | None = None
     """The motion of the camera by which the clip's frames are registered, if it moves."""
 
-    def shot_of(self, clip: Clip) -> Clip:
+    def uncut_clip(self, clip: Clip) -> Clip:
         """Return the part of a clip's file that the background was estimated from."""
-        return clip if self.shot is None else clip.part(*self.shot)
+        return clip if self.uncut_span is None else clip.part(*self.uncut_span)
 
 
 def find_backdrop(clip: Clip, camera: Camera | None, background: Background | None) -> Backdrop:
@@ -159,7 +159,7 @@ def _estimated(clip: Clip, moves: bool, smoke: Mask | None, motion: CameraMotion
         clip, proxy = quiet, Proxy.of(quiet)
     part, cut = proxy.shot(clip)
     part = part.evened
-    found = likeliest(part, white)
+    found = likeliest_background(part, white)
     color, objects = found.color, found.objects
     if moves:
         passes_by = found.clear < MOSTLY or white.max() > TEXTURE
@@ -187,8 +187,8 @@ def _estimated(clip: Clip, moves: bool, smoke: Mask | None, motion: CameraMotion
             color, objects, source = np.zeros(3, np.float32), np.zeros_like(objects), "black for want of a picture"
     if color is not None:
         plate = _of_one_color(clip, part, color, objects, white)
-    shot = part.numbers[0], part.numbers[-1]
-    return Backdrop(source, clip.exposed(plate.gain), plate, None, len(part.numbers), shot, cut, motion=motion)
+    span = part.numbers[0], part.numbers[-1]
+    return Backdrop(source, clip.exposed(plate.gain), plate, None, len(part.numbers), span, cut, motion=motion)
 
 
 def _picture(clip: Clip, proxy: Proxy, white: Picture, smoke: Mask | None) -> Plate:

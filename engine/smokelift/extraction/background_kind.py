@@ -90,7 +90,7 @@ class Hypothesis:
     clear: float
 
 
-def likeliest(proxy: Proxy, white: Picture) -> Hypothesis:
+def likeliest_background(proxy: Proxy, white: Picture) -> Hypothesis:
     """Return the likeliest background of frames of one exposure; ``white`` (3,) is their pixels' noise."""
     values, visible = _blocks(proxy)
     rows, columns = proxy.seen.shape[1:]

@@ -78,20 +78,21 @@ CLEAR_TRANSMITTANCE = 0.02
 """Lower bound of T, for division."""
 
 
-def plate_and_source(clip: Clip, shot: Clip, plate: Plate, smoky: Sequence[int]) -> tuple[Plate, Picture]:
-    """Return the plate of a clip, better known if it was found in its ``shot``, and its smoke's source radiance.
+def plate_and_source(clip: Clip, uncut: Clip, plate: Plate, smoky: Sequence[int]) -> tuple[Plate, Picture]:
+    """Return the plate of a clip, better known if it was found in its file, and its smoke's source radiance.
 
-    Both clips are at the plate's exposure; ``smoky`` are frames of the clip, those with the most smoke first.
+    ``uncut`` is all of that file between two cuts. Both clips are at the plate's exposure; ``smoky`` are frames of the
+    clip, those with the most smoke first.
     """
     thickest = SomeFrames.of(clip, plate, sorted(smoky[:SOURCE_FRAMES]), SOURCE_SIDE, MAX_CELLS)
-    seen = thickest.before(thickest.plate)
+    seen = thickest.against(thickest.plate)
     if plate.images is not None or is_known(plate):
         return plate, source_in(seen)
-    frames = SomeFrames.of(shot, plate, shot.spread(FRAMES), SIDE)
-    starts = [likeliest(frames, source) for source in (first_source(seen), source_in(seen))]
+    frames = SomeFrames.of(uncut, plate, uncut.spread(FRAMES), SIDE)
+    starts = [likeliest_plate(frames, source) for source in (first_source(seen), source_in(seen))]
     turned = in_turn(frames, min(starts, key=lambda start: start.loss))
     for _ in range(SOURCES):
-        start = likeliest(frames, source_in(thickest.before(frames.with_plate(thickest.plate, turned))))
+        start = likeliest_plate(frames, source_in(thickest.against(frames.with_plate(thickest.plate, turned))))
         if start.loss > MAX_LOSS_RATIO * turned.loss:
             break
         turned = in_turn(frames, start)
@@ -139,8 +140,8 @@ class SomeFrames:
         pictures = [clip.stored(frame).averaged(*size) for frame in numbers]
         return SomeFrames(clip, numbers, pictures, resized(plate, size), cells)
 
-    def before(self, plate: Plate) -> list[Cells]:
-        """Return the cells of the frames before a plate of their size."""
+    def against(self, plate: Plate) -> list[Cells]:
+        """Return the cells of the frames against a plate of their size."""
         shown = zip(self.numbers, self.pictures, strict=True)
         return [Cells.of(picture, plate.at(number), self.cells) for number, picture in shown]
 
@@ -164,7 +165,7 @@ def in_turn(frames: SomeFrames, start: HiddenPlate) -> HiddenPlate:
     for _ in range(TURNS):
         found = replace(plate, image=_changed(plate, turned.image - behind))
         best, clearest = np.zeros_like(start.left), start.image
-        for cells in frames.before(found):
+        for cells in frames.against(found):
             shown, weight = _shown(cells, start.source)
             # errors of smoke are much the same in all frames, so a mean of frames is no better than the best of them
             best, clearest = np.maximum(best, weight), np.where(weight > best, shown, clearest)
@@ -182,7 +183,7 @@ class _Hypothesis(NamedTuple):
     clear: float = 1.0
 
 
-def likeliest(frames: SomeFrames, source: Picture) -> HiddenPlate:
+def likeliest_plate(frames: SomeFrames, source: Picture) -> HiddenPlate:
     """Return the plate that best explains all frames as mixtures with smoke of a source radiance (3,).
 
     A frame's loss is that of the noise's Student t distribution at the likeliest T. The brightness of J varies by
@@ -190,7 +191,7 @@ def likeliest(frames: SomeFrames, source: Picture) -> HiddenPlate:
     there as well, so neighbors decide together.
     """
     pictures, plate, size = frames.pictures, frames.plate, frames.cells
-    shown = frames.before(plate)
+    shown = frames.against(plate)
     start = shown[0].behind
     where = shown[0].unknown > MIN_UNKNOWN
     continued = _continuations(start, ~where)

@@ -42,14 +42,20 @@ class ResumeState:
         write_arrays(path, arrays, compressed=False)
 
     @staticmethod
+    def last_number(path: Path) -> int | None:
+        """The number of the last finished frame; None if there is no state, OSError if the file is damaged."""
+        return int(read_arrays(path, {"number": ()})["number"]) if path.is_file() else None
+
+    @staticmethod
     def read(path: Path, shape_of: Callable[[int], tuple[int, int, int]]) -> "ResumeState | None":
         """Read the state, or return None if no frame was finished; OSError if the file is damaged.
 
         `shape_of` gives the voxels of a frame, by its number.
         """
-        if not path.is_file():
+        last = ResumeState.last_number(path)
+        if last is None:
             return None
-        shape = shape_of(int(read_arrays(path, {"number": ()})["number"]))
+        shape = shape_of(last)
         arrays = read_arrays(
             path,
             {"number": (), **dict.fromkeys(VELOCITY)},

@@ -197,11 +197,9 @@ class SequenceWriter:
                 f"{self.directory}: was begun differently and cannot be resumed: {what}; choose another directory"
             )
         self._clear("*")
-        frames = there.frames
         if not there.complete:
             self.state = self._last_state(there)
-            last = self.state.number if self.state is not None else -1
-            frames = {number: figures for number, figures in frames.items() if int(number) <= last}
+        frames = _kept(there, None if self.state is None else self.state.number)
         written = {self._path(int(number), kind).name for number in frames for kind in ("vdb", "npz")}
         checksums = {name: digits for name, digits in there.checksums.items() if name in written}
         self._index = replace(self._index, frames=frames, checksums=checksums, complete=there.complete)
@@ -219,7 +217,7 @@ class SequenceWriter:
         try:
             return ResumeState.read(self.directory / files.RESUME, shape_of)
         except OSError as error:
-            raise SequenceError(f"{error}; this run cannot be resumed, choose another directory") from error
+            raise _not_resumable(error) from error
 
     def _check_files(self) -> None:
         """Refuse to go on, or to call the sequence complete, if files of finished frames were taken away."""
@@ -244,6 +242,30 @@ def check_directory(directory: Path, *, resume: bool) -> None:
     nearest = next(folder for folder in (directory, *directory.absolute().parents) if folder.exists())
     if not nearest.is_dir() or not os.access(nearest, os.W_OK | os.X_OK):
         raise SequenceError(f"{directory}: cannot be written to: {nearest} is no folder, or may not be changed")
+
+
+def count_finished(directory: Path) -> int:
+    """Return how many frames of a directory a `SequenceWriter` that resumes its run would keep."""
+    if not (directory / files.INDEX).is_file():
+        return 0
+    try:
+        return len(_kept(Index.read(directory), ResumeState.last_number(directory / files.RESUME)))
+    except OSError as error:
+        raise _not_resumable(error) from error
+
+
+def _kept(there: Index, last: int | None) -> dict[str, Mapping[str, Any]]:
+    """The frames of an earlier run that need not be computed again; ``last`` is the one that its state is of."""
+    # a frame counts in the index before its state is written, so that a killed run may have one more
+    return {
+        number: figures
+        for number, figures in there.frames.items()
+        if there.complete or (last is not None and int(number) <= last)
+    }
+
+
+def _not_resumable(error: OSError) -> SequenceError:
+    return SequenceError(f"{error}; this run cannot be resumed, choose another directory")
 
 
 def written_kinds(npz: bool) -> tuple[str, ...]:

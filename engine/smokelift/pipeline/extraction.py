@@ -124,4 +124,4 @@ def extract(clip: Clip, scene: Scene) -> Extraction:
     require_kind(scene, Scene, "scene", "a Scene (Scene() leaves all open, Scene.load reads a file)")
     found = find_backdrop(clip, scene.camera, scene.background)
     smoky = sample_smoke(found.clip, found.plate).smoky or range(len(clip))
-    return Extraction(found.clip, *plate_and_source(found.clip, found.shot_of(found.clip), found.plate, smoky))
+    return Extraction(found.clip, *plate_and_source(found.clip, found.uncut_clip(found.clip), found.plate, smoky))

@@ -1,10 +1,10 @@
 """The main job (algorithms 1 and 4): a clip in, one frame of density and velocity after the other out.
 
-rho_1, rho_2 from their pictures alone; then for t = 3, 4, ...
+rho_1 and rho_2 are fitted to their pictures alone, and u_2 = VelRecon(rho_1, rho_2); then for t = 3, 4, ...
     u~_t   = Project(advect(u_t-1, u_t-1))          prediction of the velocity
     rho~_t = advect(rho_t-1, u~_t)                  prediction of the density
     rho_t  = Reconstruction(picture_t, rho~_t)      correction by the renderer
-    u_t    = VelRecon(rho_t-1, rho_t)               correction of the velocity
+    u_t    = VelRecon(rho_t-1, rho_t, u~_t)         correction of the velocity
 """
 
 import time
@@ -18,6 +18,7 @@ from smokelift.density import FittedDensity, ViewSet
 from smokelift.density.flame import flame_emission
 from smokelift.density.hull import project_voxels
 from smokelift.footage.images import Picture
+from smokelift.pipeline.carried_state import CarriedState
 from smokelift.pipeline.clip_fit import clip_psnr
 from smokelift.pipeline.method import Method
 from smokelift.render import Volume
@@ -25,8 +26,8 @@ from smokelift.render.device import products_on_one_thread
 from smokelift.setup.shot import Shot
 from smokelift.transport import Array, Velocity
 from smokelift.velocity.estimator import DensityPair
-from smokelift.velocity.near_smoke import carry, near_smoke
-from smokelift.velocity.seen_motion import with_seen_motion
+from smokelift.velocity.near_smoke import advect_near, refine_near_smoke
+from smokelift.velocity.optical_flow import PicturePair
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,80 +45,68 @@ class Frame:
     figures
         Measures of the fit and seconds spent: ``psnr`` of the clip's own pixels inside the smoke (`clip_psnr`),
         ``psnr_working`` and what else `smokelift.density.FittedDensity` says of the working pictures.
-    estimated
-        The velocity on the grid of its estimate, all over the domain.
-    smooth : (nx, ny, nz) float32, optional
-        The density without what the depth prior makes up, which the velocity is estimated from; None if that is all of
-        it.
-    steady : (nx, ny, nz) float32, optional
-        What the next frame carries along, if not the density: see `smokelift.density.FittedDensity`.
     flame : (nx, ny, nz) float32, optional
         Emission of fire, radiance per meter of the color ``flame_color`` of the scene's medium; None where the clip
         shows no fire.
-    followed : (rows, columns), optional
-        What is followed of the picture to the next one; None where no camera stands still alone, or sees nothing.
     """
 
     number: int
     density: Volume
     velocity: Velocity
     figures: Mapping[str, Any]
-    estimated: Velocity
-    smooth: Volume | None = None
-    steady: Volume | None = None
     flame: Volume | None = None
-    followed: Picture | None = None
 
 
-def frames_after(before: Frame | None, shot: Shot, method: Method) -> Iterator[Frame]:
-    """Yield a shot's frames after one, or all; the first waits until the second gives it a velocity."""
+def frames_after(before: CarriedState | None, shot: Shot, method: Method) -> Iterator[tuple[Frame, CarriedState]]:
+    """Yield a shot's frames after one, or all, each with what it hands on.
+
+    The first waits until the second gives it a velocity.
+    """
     count = len(shot.clip)
-    follows = method.follows_picture and len(shot.views) == 1 and not shot.moves
-    estimator = method.velocity_estimator.of_one_view() if follows else method.velocity_estimator
+    flow = method.optical_flow and len(shot.views) == 1 and not shot.moves
     with products_on_one_thread():
-        method = replace(method, depth_prior=method.depth_prior.of_clip(shot), velocity_estimator=estimator)
-        if before is not None and follows and before.followed is None:  # a run that goes on
-            before = replace(before, followed=_followed(_seen(before.number - 1, shot)))
-    first: Frame | None = None
+        method = replace(method, depth_prior=method.depth_prior.of_clip(shot))
+        if before is not None and flow:  # a run that goes on: its state has no picture
+            before = replace(before, picture=_flow_picture(_seen(before.number - 1, shot)))
+    first: tuple[Frame, CarriedState] | None = None
     for index in range(before.number if before else 0, count):
         with products_on_one_thread():
-            frame = _frame(index, before, shot, method, follows=follows)
-        # what the next one needs: not the velocity on the fine grid, which takes much memory, nor fire
-        before = replace(frame, velocity=frame.estimated, figures={}, flame=None)
+            frame, before = _frame(index, before, shot, method, flow=flow)
         if index == 0 and count > 1:
-            first = frame
+            first = frame, before
             continue
         if first is not None:
-            yield replace(first, velocity=frame.velocity, estimated=frame.estimated)
+            yield replace(first[0], velocity=frame.velocity), replace(first[1], velocity=before.velocity)
             first = None
-        yield frame
+        yield frame, before
         del frame  # velocities take most of the memory
 
 
-def _frame(index: int, before: Frame | None, shot: Shot, method: Method, *, follows: bool) -> Frame:
-    """One frame, counted from 0, from its pictures and the frame before."""
+def _frame(
+    index: int, before: CarriedState | None, shot: Shot, method: Method, *, flow: bool
+) -> tuple[Frame, CarriedState]:
+    """One frame, counted from 0, from its pictures and what the frame before hands on; and what it hands on itself."""
     began = time.perf_counter()
     domain, dt = shot.optics.domain, 1.0 / shot.clip.fps
     predicted = None
     # from where there was no smoke nothing is carried
     if before is not None and index >= 2 and before.density.any():
-        predicted = method.velocity_estimator.predict(before.estimated, dt)
+        predicted = method.velocity_estimator.predict(before.velocity, dt)
     views = _seen(index, shot)
     fitted, taken_over = _density(views, before, predicted, shot, method)
-    followed = _followed(views) if follows else None
+    picture = _flow_picture(views) if flow else None
     flame = _flame(index, fitted.density, shot)
     fit = _fit_figures(index, fitted, shot)
     fit_done = time.perf_counter()
     if before is None:
         velocity = estimated = Velocity.zero(domain.resolution, domain.voxel_size, shot.scene.closed)
     else:
-        measured = _measured(before, fitted)
-        pair = DensityPair(*measured, dt, domain.voxel_size, shot.scene.closed, shot.scene.inflow())
-        estimated = method.velocity_estimator.estimate(pair, predicted)
-        if views is not None and before.followed is not None and followed is not None:
-            camera = views.views[0].camera
-            estimated = with_seen_motion(estimated, before.followed, followed, camera, domain, measured[1], dt)
-        velocity = near_smoke(estimated, (before.density > 0) | (fitted.density > 0), dt, domain.voxel_size)
+        pair = DensityPair(*_measured(before, fitted), dt, domain.voxel_size, shot.scene.closed, shot.scene.inflow())
+        pictures = None
+        if views is not None and before.picture is not None and picture is not None:
+            pictures = PicturePair(before.picture, picture, views.views[0].camera, domain)
+        estimated = method.velocity_estimator.estimate(pair, predicted, pictures)
+        velocity = refine_near_smoke(estimated, (before.density > 0) | (fitted.density > 0), dt, domain.voxel_size)
     done = time.perf_counter()
     figures = {
         **fit,
@@ -127,7 +116,10 @@ def _frame(index: int, before: Frame | None, shot: Shot, method: Method, *, foll
         "seconds_density": fit_done - began,
         "seconds_velocity": done - fit_done,
     }
-    return Frame(index + 1, fitted.density, velocity, figures, estimated, fitted.smooth, fitted.steady, flame, followed)
+    number = index + 1
+    return Frame(number, fitted.density, velocity, figures, flame), CarriedState(
+        number, fitted.density, estimated, fitted.smooth_density, fitted.for_advection, picture
+    )
 
 
 def _seen(index: int, shot: Shot) -> ViewSet | None:
@@ -136,8 +128,8 @@ def _seen(index: int, shot: Shot) -> ViewSet | None:
     return ViewSet.of(observations, shot.optics, index) if observations else None
 
 
-def _followed(views: ViewSet | None) -> Picture | None:
-    """What is followed of the only camera's picture, so that thin smoke counts; None if it shows nothing."""
+def _flow_picture(views: ViewSet | None) -> Picture | None:
+    """What optical flow is found in: roots of the only camera's optical depths, so that thin smoke counts."""
     return None if views is None else np.sqrt(views.views[0].optical_depth)
 
 
@@ -149,15 +141,15 @@ def _fit_figures(index: int, fitted: FittedDensity, shot: Shot) -> dict[str, flo
     return {**clip_psnr(shot, index, fitted.density), **working}
 
 
-def _measured(before: Frame, fitted: FittedDensity) -> tuple[Volume, Volume]:
+def _measured(before: CarriedState, fitted: FittedDensity) -> tuple[Volume, Volume]:
     """The densities of two frames, without what is made up if that is known of both: it shows no motion of its own."""
-    if before.smooth is None or fitted.smooth is None:
+    if before.smooth_density is None or fitted.smooth_density is None:
         return before.density, fitted.density
-    return before.smooth, fitted.smooth
+    return before.smooth_density, fitted.smooth_density
 
 
 def _density(
-    views: ViewSet | None, before: Frame | None, predicted: Velocity | None, shot: Shot, method: Method
+    views: ViewSet | None, before: CarriedState | None, predicted: Velocity | None, shot: Shot, method: Method
 ) -> tuple[FittedDensity, Mapping[str, float]]:
     """The density of a frame, the carried one where nothing is seen, and what the fit took over of the carried one."""
     if views is None:
@@ -171,7 +163,7 @@ def _density(
     unseen: tuple[Volume, Volume] | None = None
     figures = {}
     if carried is not None:
-        start = method.temporal_prior.start(depth.views, depth, *carried)
+        start = method.temporal_prior.start(depth, *carried)
         initial, figures = start.density, start.figures
         # what a moving camera does not see now it may have seen before
         unseen = carried if shot.moves else None
@@ -181,22 +173,24 @@ def _density(
     fitted = method.density_fit.fit(views, priors.pop(), starts.pop())
     if unseen is not None:
         visible = project_voxels(views.views[0].camera, shot.optics.domain).visible
-        density, kept = np.where(visible, fitted.density, unseen[0]), fitted.smooth
+        density, kept = np.where(visible, fitted.density, unseen[0]), fitted.smooth_density
         if kept is not None:
             kept = np.where(visible, kept, unseen[1])
-        fitted = replace(fitted, density=density, smooth=kept, steady=None)
+        fitted = replace(fitted, density=density, smooth_density=kept, for_advection=None)
     return fitted, figures
 
 
-def _carried(before: Frame | None, predicted: Velocity | None, shot: Shot) -> tuple[Volume, Volume] | None:
-    """The density of the frame before and its smooth answer, carried along; None where there is no prediction."""
+def _carried(before: CarriedState | None, predicted: Velocity | None, shot: Shot) -> tuple[Volume, Volume] | None:
+    """The density of the frame before and its smooth density, carried along; None where there is no prediction."""
     if before is None or predicted is None:
         return None
-    density = before.density if before.steady is None else before.steady
+    density = before.density if before.for_advection is None else before.for_advection
     # what a moving camera does not see no picture corrects, so that its mass has to be kept
     dt, h = 1.0 / shot.clip.fps, shot.optics.domain.voxel_size
-    carried = carry(density, predicted, dt, h, conserve=shot.moves)
-    return carried, carried if before.smooth is None else carry(before.smooth, predicted, dt, h, conserve=shot.moves)
+    carried = advect_near(density, predicted, dt, h, conserve=shot.moves)
+    if before.smooth_density is None:
+        return carried, carried
+    return carried, advect_near(before.smooth_density, predicted, dt, h, conserve=shot.moves)
 
 
 def _flame(index: int, density: Volume, shot: Shot) -> Volume | None:

@@ -1,4 +1,4 @@
-"""A method of reconstruction: four parts, each of which can be exchanged.
+"""A method of reconstruction: four parts, each of which can be exchanged, and whether optical flow is used.
 
 The default and the paper's method are two compositions; an ablation is a third, by `dataclasses.replace`.
 """
@@ -9,11 +9,11 @@ from smokelift.baselines.density import AllCarried, FixedRateDescent, Orthogonal
 from smokelift.baselines.velocity import PaperVelocity
 from smokelift.checks import require_kind
 from smokelift.density import (
+    AdvectedDetail,
     DensityFit,
     DepthPrior,
     DetailedDepth,
     GradientFit,
-    GuidedSimulation,
     NothingCarried,
     RoundDepth,
     TemporalPrior,
@@ -36,16 +36,16 @@ class Method:
         Finds the velocity between two densities, and predicts the next.
     temporal_prior
         What a frame takes over from the one before.
-    follows_picture
-        Whether, where one camera that stands still alone sees the smoke, the velocity is estimated as of one view and
-        corrected by what moves in the picture (`VelocityEstimator.of_one_view`, `velocity.seen_motion`).
+    optical_flow
+        Whether the estimator gets the pictures, where one camera that stands still alone sees the smoke, to correct the
+        velocity by the optical flow in them (`velocity.optical_flow`).
     """
 
     density_fit: DensityFit
     depth_prior: DepthPrior
     velocity_estimator: VelocityEstimator
     temporal_prior: TemporalPrior
-    follows_picture: bool = True
+    optical_flow: bool = True
 
 
 def other_parts(method: Method, settings: Settings) -> dict[str, str | bool]:
@@ -62,11 +62,11 @@ def compose(settings: Settings) -> Method:
     """The method that settings ask for."""
     require_kind(settings, Settings, "settings", "Settings (Settings.preset makes them)")
     if settings.method == "paper":
-        return Method(FixedRateDescent(), OrthogonalCopy(), PaperVelocity(), AllCarried(), follows_picture=False)
+        return Method(FixedRateDescent(), OrthogonalCopy(), PaperVelocity(), AllCarried(), optical_flow=False)
     smooth = RoundDepth()
     return Method(
         density_fit=GradientFit(settings.density),
         depth_prior=DetailedDepth(smooth, settings.detail, settings.seed) if settings.detail > 0 else smooth,
         velocity_estimator=CoarseToFine(settings.velocity),
-        temporal_prior=GuidedSimulation(settings.transport) if settings.transport > 0 else NothingCarried(),
+        temporal_prior=AdvectedDetail(settings.transport) if settings.transport > 0 else NothingCarried(),
     )

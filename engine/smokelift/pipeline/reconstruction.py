@@ -1,7 +1,7 @@
 """A clip's reconstruction: checked and prepared when it is made, computed when it is iterated over or written."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -9,9 +9,9 @@ from smokelift.checks import require_kind
 from smokelift.footage.clip import Clip
 from smokelift.output.files import checksum
 from smokelift.output.index import directory_path
-from smokelift.output.resume import ResumeState
 from smokelift.output.sequence import Sequence
 from smokelift.output.writer import SequenceWriter
+from smokelift.pipeline.carried_state import CarriedState
 from smokelift.pipeline.loop import Frame, frames_after
 from smokelift.pipeline.method import Method, compose, other_parts
 from smokelift.report.result import provenance
@@ -20,7 +20,6 @@ from smokelift.scene import EnvironmentLight, Scene
 from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot
-from smokelift.transport import Velocity, halved
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +45,9 @@ class Reconstruction:
         require_kind(self.method, Method, "method", "a Method (compose makes one)")
 
     def __iter__(self) -> Iterator[Frame]:
-        return frames_after(None, self.shot, self.method)
+        for frame, _ in frames_after(None, self.shot, self.method):
+            yield frame
+            del frame  # nothing holds it while the next is computed
 
     def write(
         self,
@@ -103,22 +104,21 @@ class Reconstruction:
     def _write_rest(self, writer: SequenceWriter, on_frame: Callable[[Frame], object] | None) -> None:
         """Write the frames that are not finished."""
         # no name here holds a frame or its velocities while the next is computed: they take most of the memory
-        frames = frames_after(
-            None if writer.state is None else _resumed(writer.state, self.shot), self.shot, self.method
-        )
-        for frame in frames:
-            if frame.number not in writer.finished:
-                writer.write(
-                    frame.number,
-                    frame.density,
-                    frame.velocity.faces,
-                    frame.figures,
-                    flame=frame.flame,
-                    state=_state(frame),
-                )
-                if on_frame is not None:
-                    on_frame(frame)
-            del frame
+        last = None if writer.state is None else CarriedState.read(writer.state, self.shot)
+        frames = frames_after(last, self.shot, self.method)
+        del last
+        for frame, carried in frames:
+            writer.write(
+                frame.number,
+                frame.density,
+                frame.velocity.faces,
+                frame.figures,
+                flame=frame.flame,
+                state=carried.stored(),
+            )
+            if on_frame is not None:
+                on_frame(frame)
+            del frame, carried
 
 
 def reconstruct(
@@ -150,23 +150,6 @@ def reconstruct(
     require_kind(method, Method | None, "method", "a Method (compose makes one)")
     shot = prepare_shot(clip, scene, settings)
     return Reconstruction(shot, method or compose(shot.settings))
-
-
-def _state(carried: Frame) -> ResumeState:
-    """What is carried to the next frame, for a run that goes on."""
-    volumes = {"smooth": carried.smooth, "steady": carried.steady}
-    kept = {name: volume for name, volume in volumes.items() if volume is not None}
-    return ResumeState(carried.number, carried.density, carried.estimated.faces, kept)
-
-
-def _resumed(state: ResumeState, shot: Shot) -> Frame:
-    """The inverse of `_state`."""
-    velocity = Velocity(state.velocity, shot.optics.domain.voxel_size, shot.scene.closed)
-    shape = shot.optics.domain.resolution
-    while shape != velocity.shape:
-        shape, velocity = halved(shape), replace(velocity, voxel_size=2 * velocity.voxel_size)
-    smooth, steady = (state.extra.get(name) for name in ("smooth", "steady"))
-    return Frame(state.number, state.density, velocity, {}, velocity, smooth, steady)
 
 
 def sources(shot: Shot) -> dict[str, dict[str, Any]]:

@@ -186,7 +186,10 @@ def memory_needed(resolution: Shape, work: Workload) -> int:
     """Return the bytes that a run takes at its peak."""
     voxels = math.prod(resolution)
     per_voxel, per_smoky_voxel = BYTES_PER_VOXEL_OF_SMALL_GRID if voxels < SMALL_GRID_VOXELS else BYTES_PER_VOXEL
-    if work.settings.method == "paper" or work.settings.velocity.coarsening == 0:
+    coarsening = work.settings.velocity.coarsening
+    # one that is not given is chosen, unless nothing is measured: then it is 0
+    on_own_grid = not work.settings.measure if coarsening is None else coarsening == 0
+    if work.settings.method == "paper" or on_own_grid:
         per_voxel += BYTES_PER_VOXEL_OF_SOLVER
     return round(BASE_BYTES + BYTES_PER_PIXEL * work.pixels + (per_voxel + work.smoky_max * per_smoky_voxel) * voxels)
 

@@ -45,7 +45,7 @@ def provenance(shot: Shot) -> list[Finding]:
 def made_up(shot: Shot) -> list[Finding]:
     """Return what a run will make up, with the settings that choose it: if there is a side without a camera near it."""
     settings, cameras = shot.settings, [view.working.camera for view in shot.views]
-    if settings.detail == 0 or not unseen_sides(Turntable.before(cameras[0], shot.optics.domain), cameras):
+    if settings.detail == 0 or not unseen_sides(Turntable.facing(cameras[0], shot.optics.domain), cameras):
         return []
     chosen = {"detail": settings.detail, "seed": settings.seed}
     return [Finding("texture of the clip", chosen, about="fine structure along the rays", source="made up")]

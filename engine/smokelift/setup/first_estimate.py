@@ -86,10 +86,9 @@ class Fire:
 class FirstEstimate:
     """What a clip shows: its background, its smoke, and its fire if any burns.
 
-    ``plate`` is the one that was ``found``, and better known where smoke hides it. ``clip`` is the footage that was
-    ``found``, without fire. ``hot`` are the pixels that are fire, or may be. ``source`` (3,) is the usual source
-    radiance of the smoke before a picture; None before one that does not show its transmittance (`with_source`), and
-    without smoke.
+    ``plate`` is ``found.plate``, refined where smoke hides it; ``clip`` is ``found.clip`` without fire. ``hot`` are the
+    pixels that are fire, or may be. ``source`` (3,) is the usual source radiance of the smoke before a picture; None
+    before one that does not show its transmittance (`with_source`), and without smoke.
     """
 
     clip: Clip
@@ -138,7 +137,7 @@ def with_source(found: Backdrop, clip: Clip, samples: SmokeSamples) -> tuple[Pla
     shown = visible_plate(found.plate, clip, samples.smoky[0])
     if found.source != "picture" and backdrop_color(shown) is not None:
         return found.plate, None, samples
-    plate, source = plate_and_source(clip, found.shot_of(clip), found.plate, samples.smoky)
+    plate, source = plate_and_source(clip, found.uncut_clip(clip), found.plate, samples.smoky)
     if not shows_transmittance(visible_plate(plate, clip, samples.smoky[0]), source):
         return found.plate, None, samples
     if plate is not found.plate:
@@ -172,15 +171,15 @@ def sample_smoke(clip: Clip, plate: Plate) -> SmokeSamples:
     exposure = 0.0
     reduced = plate.through(lambda whole: area_average(whole, columns, rows), scale**2)
     for number in clip.spread(SAMPLE_FRAMES):
-        picture, before = clip.stored(number).averaged(columns, rows), reduced.at(number)
+        picture, clear = clip.stored(number).averaged(columns, rows), reduced.at(number)
         exposure = max(exposure, float(np.expm1(np.abs(np.log(clip.gain(number))).max())))
-        mask = matte(picture, before).mask
+        mask = matte(picture, clear).mask
         covered |= mask
         hidden = unknown_part(reduced, clip, number)
         unknown |= hidden
         over_known[number] = int((mask & ~hidden).sum())
         colors.append(picture[mask])
-        behind.append(before.image[mask])
+        behind.append(clear.image[mask])
         if mask.any():
             counts[number] = int(mask.sum())
     smoky = tuple(sorted(counts, key=lambda number: -counts[number]))

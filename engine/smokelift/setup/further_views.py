@@ -92,7 +92,7 @@ def _open_view(number: int, clip: Clip, scene: CompleteScene) -> tuple[ShotView,
     found = find_backdrop(view_clip, camera, background)
     try:
         plate, source, _ = with_source(found, found.clip, sample_smoke(found.clip, found.plate))
-        shown = replace(ShotView.before(scene.domain, found.clip, camera, plate), source=source)
+        shown = replace(ShotView.facing(scene.domain, found.clip, camera, plate), source=source)
     except CameraError as error:
         raise ValueError(f"View {number + 1}: {error}") from error
     axes = [np.array(each.matrix)[:3, 2] for each in (scene.camera, camera)]

@@ -11,25 +11,22 @@ import numpy as np
 from smokelift.checks import UNDETERMINED, Finding, Source, counted, require_kind
 from smokelift.density import AxisEstimate, clip_axis
 from smokelift.footage.clip import Clip
-from smokelift.render import scene_optics
-from smokelift.scene import SHADOWED, Background, CompleteScene, Domain, Scene
+from smokelift.render import Image, scene_optics
+from smokelift.scene import SHADOWED, Background, CompleteScene, Domain, Scattering, Scene
 from smokelift.setup.backdrop_findings import first_findings
 from smokelift.setup.coarse import coarse_frame, coarse_frames
-from smokelift.setup.first_estimate import first_estimate
+from smokelift.setup.first_estimate import FirstEstimate, first_estimate
 from smokelift.setup.further_views import disagreement, open_views
 from smokelift.setup.geometry import find_geometry
 from smokelift.setup.illumination import find_scattering, first_light, light_doubts
 from smokelift.setup.medium import find_medium
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot, ShotView
+from smokelift.velocity.pyramid import COARSEST_SIDE, default_coarsening
 
 SHADOWED_SOURCE = 0.5
 """Usual source radiance of smoke over that without shadows, within the factor of two that an extraction needs (measured
 on two baked scenes: .52 and .55)."""
-
-MAX_VELOCITY_SIDE = 30
-"""Voxels along the longest side of the velocity's grid, at most: one view leaves the depth undetermined, and finer
-velocities follow its errors (docs/experiments/velocity-solver.md)."""
 
 
 def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> Shot:
@@ -55,7 +52,7 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
     settings = settings or Settings.preset()
     _check(len(clip), scene, settings)
     estimate = first_estimate(clip, scene.camera, scene.background, scene.medium)
-    plate, samples = estimate.plate, estimate.samples
+    samples = estimate.samples
     geometry = find_geometry(scene, estimate, settings)
     camera, domain = geometry.camera, geometry.domain
     medium, of_medium = find_medium(scene, estimate, camera, domain)
@@ -73,32 +70,23 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
         closed=scene.closed,
         inlets=scene.inlets,
     )
-    first = replace(ShotView.before(domain, estimate.clip, camera, plate), source=estimate.source)
-    if estimate.source is not None and scene.lights:
-        lit = scene_optics(complete).unshadowed_source()
-        lit = SHADOWED_SOURCE * lit if complete.scattering in SHADOWED else lit
-        if estimate.found.source == "picture" and samples.exposure:
-            # a plate from a clip whose white balance changes has that of some frame, and no light's
-            lit = lit.mean() * estimate.source / estimate.source.mean()
-        first = replace(first, source=np.asarray(lit, np.float32))
-    # strokes give it where an alpha channel leaves nothing to estimate
-    decided = scene.background is not None and (not scene.background.estimated or estimate.found.source == "alpha")
-    of_clip = first_findings(estimate, decided)
-    findings = [*clip.findings(), *of_clip, *geometry.findings, *of_medium, *of_light]
-    coarse = coarse_frames((first,), samples.typical, complete) if settings.measure else ()
-    if coarse and asked is not None:
-        findings.append(Finding("given", about="scattering", value=asked, source="given"))
-    elif coarse:
-        finer = partial(coarse_frame, (first,), coarse[0].number, complete, times=2)
-        scattering, chosen = find_scattering(coarse, finer, settings)
-        complete = replace(complete, scattering=scattering)
-        findings.append(chosen)
-        if of_light:
-            findings += light_doubts(chosen, samples, plate.noise, burns=estimate.fire is not None)
+    source = _source_in_light(estimate, complete) if scene.lights else estimate.source
+    first = replace(ShotView.facing(domain, estimate.clip, camera, estimate.plate), source=source)
+    complete, of_scattering = _with_scattering(complete, asked, first, estimate, bool(of_light), settings)
     if complete.scattering == "absorption":
-        findings = [found for found in findings if found.about != "source radiance"]
+        of_light = [found for found in of_light if found.about != "source radiance"]
     others, of_views = open_views(first, complete, samples.typical, bool(scene.lights), settings)
-    findings += of_views
+    # with an alpha channel, which leaves no background to estimate, strokes alone count as a given one
+    decided = scene.background is not None and (not scene.background.estimated or estimate.found.source == "alpha")
+    findings = [
+        *clip.findings(),
+        *first_findings(estimate, decided),
+        *geometry.findings,
+        *of_medium,
+        *of_light,
+        *of_scattering,
+        *of_views,
+    ]
     if settings.measure:
         coarsening, chosen = velocity_coarsening(domain, settings)
         findings.append(chosen)
@@ -120,6 +108,41 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
     return shot if place is None else replace(shot, place=place, findings=(*shot.findings, found_place(place)))
 
 
+def _source_in_light(estimate: FirstEstimate, scene: CompleteScene) -> Image | None:
+    """The usual source radiance (3,) of the smoke in the scene's light; None where the estimate has none."""
+    if estimate.source is None:
+        return None
+    lit = scene_optics(scene).unshadowed_source()
+    if scene.scattering in SHADOWED:
+        lit = SHADOWED_SOURCE * lit
+    if estimate.found.source == "picture" and estimate.samples.exposure:
+        # a plate from a clip whose white balance changes has that of some frame, and no light's
+        lit = lit.mean() * estimate.source / estimate.source.mean()
+    return np.asarray(lit, np.float32)
+
+
+def _with_scattering(
+    scene: CompleteScene,
+    asked: Scattering | None,
+    first: ShotView,
+    estimate: FirstEstimate,
+    light_assumed: bool,
+    settings: Settings,
+) -> tuple[CompleteScene, list[Finding]]:
+    """The scene with the model of scattering that is asked for, or else explains the input's clip; and why."""
+    coarse = coarse_frames((first,), estimate.samples.typical, scene) if settings.measure else ()
+    if not coarse:
+        return scene, []
+    if asked is not None:
+        return scene, [Finding("given", about="scattering", value=asked, source="given")]
+    finer = partial(coarse_frame, (first,), coarse[0].number, scene, times=2)
+    scattering, chosen = find_scattering(coarse, finer, settings)
+    findings = [chosen]
+    if light_assumed:
+        findings += light_doubts(chosen, estimate.samples, estimate.plate.noise, burns=estimate.fire is not None)
+    return replace(scene, scattering=scattering), findings
+
+
 def found_place(place: AxisEstimate) -> Finding:
     """Return where in depth the smoke stands; undetermined if only the box says it."""
     found = partial(Finding, f"axis depth by {place.cue}", {"depth": place.depth}, about="axis depth")
@@ -130,15 +153,13 @@ def found_place(place: AxisEstimate) -> Finding:
 
 
 def velocity_coarsening(domain: Domain, settings: Settings) -> tuple[int, Finding]:
-    """Return how many times the densities' grid is halved for the velocity, and why; no side falls below 8 voxels."""
+    """Return how many times the densities' grid is halved for the velocity, and why."""
     about = "velocity grid coarsening"
     if (given := settings.velocity.coarsening) is not None:
         return given, Finding("given", about=about, value=given, source="given")
-    coarsening, longest, shortest = 0, max(domain.resolution), min(domain.resolution)
-    while longest > MAX_VELOCITY_SIDE and shortest >= 16:
-        coarsening, longest, shortest = coarsening + 1, -(-longest // 2), -(-shortest // 2)
-    figures = {"voxels": float(longest), "tolerance": MAX_VELOCITY_SIDE}
-    return coarsening, Finding(about, figures, about=about, value=coarsening, source="measured")
+    coarsening = default_coarsening(domain.resolution)
+    figures = {"voxels": float(-(-max(domain.resolution) // 2**coarsening)), "tolerance": COARSEST_SIDE}
+    return coarsening, Finding(about, figures, about=about, value=coarsening, source="estimated")
 
 
 def _check(length: int, scene: Scene, settings: Settings) -> None:

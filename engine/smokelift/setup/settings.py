@@ -74,16 +74,16 @@ class Settings:
         light allows is taken.
     transport
         Fraction of what a frame's fit starts from that is the advected density of the frame before
-        (`smokelift.density.temporal_prior`). Beyond a half the velocity's errors
-        smear the depth (docs/experiments/temporal-prior.md). Made-up detail is carried on whatever the fraction, unless
-        it is 0. The paper's method takes all.
+        (`smokelift.density.temporal_prior`). Beyond a half the velocity's errors smear the depth
+        (docs/experiments/temporal-prior.md). With ``detail`` it is a switch: made-up detail is carried on whatever the
+        fraction, unless it is 0. The paper's method takes all.
     distance
         Level distance (meters) from the camera, straight ahead, to where the smoke stands: the lower end of it. Without
         a box it sets the scale of the scene. None takes marked inlets or the contact with the floor, else the middle of
         the box.
     detail
         How much of the fine structure along the rays, which no camera shows, is made up, from 0 to 1. At 0 the density
-        is the smooth answer, which is best for measuring; at 1 it is a plausible smoke, with the clip's texture from
+        is the smooth density, which is best for measuring; at 1 it is a plausible smoke, with the clip's texture from
         every side.
         The paper's method makes up none.
     seed

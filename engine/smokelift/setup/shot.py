@@ -33,7 +33,7 @@ class ShotView:
     source: Image | None = None
 
     @staticmethod
-    def before(domain: Domain, clip: Clip, camera: Camera, plate: Plate) -> "ShotView":
+    def facing(domain: Domain, clip: Clip, camera: Camera, plate: Plate) -> "ShotView":
         """Return a camera's view of a domain; CameraError if no frame shows it."""
         for frame in range(len(camera.matrices)):
             with suppress(CameraError):
@@ -99,7 +99,7 @@ class Shot:
         Where in depth the smoke was found to stand; None where it is given, or seen by several cameras or one
         that travels.
     fire
-        The input with the light that fire adds to it as its clip, in the place of smoke; None where none was found.
+        The input's view, its clip replaced by the light that fire adds; None without fire.
     """
 
     scene: CompleteScene

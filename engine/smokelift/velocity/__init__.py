@@ -32,6 +32,7 @@ from smokelift.scene import Side
 from smokelift.transport import Velocity
 from smokelift.velocity.coarse_to_fine import CoarseToFine, VelocitySettings
 from smokelift.velocity.estimator import DensityPair, VelocityEstimator, predict_velocity, refine
+from smokelift.velocity.optical_flow import PicturePair
 from smokelift.velocity.solver import PrimalDual, ProjectedCG, Solver
 
 
@@ -106,6 +107,7 @@ def estimate_velocity(
 __all__ = [
     "CoarseToFine",
     "DensityPair",
+    "PicturePair",
     "PrimalDual",
     "ProjectedCG",
     "Solver",

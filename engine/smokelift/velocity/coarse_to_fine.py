@@ -1,4 +1,4 @@
-"""The default estimator: on one coarse grid, or between two densities alone from coarse grids to their own."""
+"""The default estimator: on one coarse grid in a reconstruction, else coarse to fine."""
 
 from collections import Counter
 from dataclasses import dataclass, field, replace
@@ -11,17 +11,14 @@ from smokelift.transport import Array, StaggeredGrid, Velocity, require_same_sha
 from smokelift.velocity.estimator import DensityPair, in_meters, motion_weight, predict_velocity, refine
 from smokelift.velocity.linearization import SMOKE_THRESHOLD, least_squares, linearize
 from smokelift.velocity.momentum import fit_center
+from smokelift.velocity.optical_flow import PicturePair, correct_by_optical_flow
 from smokelift.velocity.preparation import PreparedPair, prepare
-from smokelift.velocity.pyramid import coarsen_density, coarsen_velocity, smooth_velocity
+from smokelift.velocity.pyramid import coarsen_density, coarsen_velocity, default_coarsening, smooth_velocity
 from smokelift.velocity.solver import ProjectedCG, Solver
 
 ONE_VIEW_SMOOTHNESS = 10.0
 """Factor on `smoothness` for densities of one view. What moves is mixed along its rays, and a depth that is assumed
 anew in every frame moves as well (docs/experiments/velocity-one-view.md)."""
-
-COARSEST_SIDE, MIN_SIDE = 30, 8
-"""Voxels along the longest side of the first grid at most, as in a reconstruction, if no side gets shorter than the
-second. Motion of several voxels is found there (docs/experiments/velocity-solver.md)."""
 
 IRROTATIONAL = 0.05
 """Weight of vorticity where there is no smoke that could show it (docs/experiments/velocity-solver.md)."""
@@ -53,9 +50,9 @@ class VelocitySettings:
     Attributes
     ----------
     coarsening
-        How many times the grid of the estimate is halved. The velocity is interpolated to the densities' grid. None
-        leaves at most 30 voxels along the longest side in a clip (see `smokelift.setup`), and the densities' own grid
-        between two densities alone.
+        How many times the grid of the estimate is halved. The velocity is interpolated to the densities' grid. None is
+        the densities' own grid, but in a clip whose open choices are measured (`Settings.measure`) one of at most 30
+        voxels along the longest side.
     linearizations
         Linearizations on each grid (docs/experiments/velocity-solver.md).
     smoothness
@@ -82,44 +79,48 @@ class CoarseToFine:
 
     settings: VelocitySettings = field(default_factory=VelocitySettings)
 
-    def estimate(self, pair: DensityPair, prediction: Velocity | None = None) -> Velocity:
-        """See `smokelift.velocity.estimate_velocity`."""
+    def estimate(
+        self, pair: DensityPair, prediction: Velocity | None = None, pictures: PicturePair | None = None
+    ) -> Velocity:
+        """See `smokelift.velocity.estimate_velocity`; with pictures it is smoother, and corrected by optical flow."""
+        settings = self.settings
+        if pictures is not None:
+            settings = replace(settings, smoothness=ONE_VIEW_SMOOTHNESS * settings.smoothness)
         require_kind(prediction, Velocity | None, "prediction", "a Velocity")
         peaks = sorted((float(pair.before.max()), float(pair.after.max())))
         seen = peaks[0] > SMOKE_THRESHOLD * peaks[1]  # between smoke and none there is no motion to be seen
-        for _ in range(self.settings.coarsening or 0):
+        for _ in range(settings.coarsening or 0):
             if prediction is not None and prediction.shape == pair.before.shape:
                 prediction = coarsen_velocity(prediction)
             pair = _half(pair)
         if prediction is not None:
             require_same_shape("the prediction", prediction.shape, pair.before.shape)
-        found = self._found(pair, prediction) if seen else None
+        found = _found(pair, prediction, settings) if seen else None
         if found is None:
-            return Velocity.zero(pair.before.shape, pair.voxel_size, pair.closed)
-        return smooth_velocity(found) if self.settings.coarsening else found
+            found = Velocity.zero(pair.before.shape, pair.voxel_size, pair.closed)
+        elif settings.coarsening:
+            found = smooth_velocity(found)
+        return found if pictures is None else correct_by_optical_flow(found, pictures, pair.after, pair.dt)
 
     def predict(self, velocity: Velocity, dt: float) -> Velocity:
         """The velocity of the next frame if no force acts, carried along on its own grid."""
         predicted = predict_velocity(velocity, dt)
         return smooth_velocity(predicted) if self.settings.coarsening else predicted
 
-    def of_one_view(self) -> "CoarseToFine":
-        """The estimator with more smoothness."""
-        return replace(self, settings=replace(self.settings, smoothness=ONE_VIEW_SMOOTHNESS * self.settings.smoothness))
 
-    def _found(self, pair: DensityPair, given: Velocity | None) -> Velocity | None:
-        """The velocity on the pair's grid; None where there is no structure to follow.
+def _found(pair: DensityPair, given: Velocity | None, settings: VelocitySettings) -> Velocity | None:
+    """The velocity on the pair's grid; None where there is no structure to follow.
 
-        Without a usable prediction it starts from that of a grid half as fine, unless the pair's grid is coarse.
-        """
-        x, y, z = shape = pair.before.shape
-        prepared, weight = prepare(pair.before, pair.after), motion_weight(shape, pair.inflow)
-        start = prediction = _usable_prediction(given, pair, prepared, weight)
-        if start is None and max(shape) > COARSEST_SIDE and min(shape) >= 2 * MIN_SIDE:
-            coarse = self._found(_half(pair), None)
-            start = None if coarse is None else refine(coarse, (x, y, z)).displacement(pair.dt)
-        u = StaggeredGrid.zero(shape, 1.0, pair.closed) if start is None else start
-        return _solved(pair, prepared, weight, u, prediction, self.settings)
+    Without a usable prediction it starts from that of a grid half as fine, unless the pair's grid is coarse.
+    """
+    x, y, z = shape = pair.before.shape
+    prepared, weight = prepare(pair.before, pair.after), motion_weight(shape, pair.inflow)
+    start = prediction = _usable_prediction(given, pair, prepared, weight)
+    if start is None and default_coarsening((x, y, z)):
+        coarse = _found(_half(pair), None, settings)
+        start = None if coarse is None else refine(coarse, (x, y, z)).displacement(pair.dt)
+    u = StaggeredGrid.zero(shape, 1.0, pair.closed) if start is None else start
+    return _solved(pair, prepared, weight, u, prediction, settings)
 
 
 def _half(pair: DensityPair) -> DensityPair:
@@ -163,12 +164,12 @@ def _solved(
         center = fit_center(prediction, prepared.after, linear, u)
         linear = linear.with_dissipation(center.dissipation)
         unexplained, _ = linear.unexplained(center.motion, prepared.noise)
-        stiffness = UNEXPLAINED / max(unexplained, MIN_UNEXPLAINED)
+        scale = UNEXPLAINED / max(unexplained, MIN_UNEXPLAINED)
         problem = least_squares(
             linear,
             center.motion,
-            second_order=stiffness * settings.smoothness,
-            kinetic=stiffness * KINETIC,
+            second_order=scale * settings.smoothness,
+            kinetic=scale * KINETIC,
             irrotational=IRROTATIONAL,
         )
         start = u if any(component.any() for component in u.faces) else center.motion

@@ -25,6 +25,7 @@ from smokelift.transport import (
     require_same_shape,
     without_divergence,
 )
+from smokelift.velocity.optical_flow import PicturePair
 from smokelift.velocity.pyramid import prolong
 
 Density = npt.NDArray[np.floating[Any]]
@@ -77,19 +78,18 @@ class DensityPair:
 class VelocityEstimator(Protocol):
     """A way to find the velocity between two densities, and to predict the next one."""
 
-    def estimate(self, pair: DensityPair, prediction: Velocity | None = None) -> Velocity:
+    def estimate(
+        self, pair: DensityPair, prediction: Velocity | None = None, pictures: PicturePair | None = None
+    ) -> Velocity:
         """Estimate the velocity that carries one density into the next: see `estimate_velocity`.
 
-        It may be on a coarser grid than the densities (`refine` leads back), and so may the prediction.
+        It may be on a coarser grid than the densities (`refine` leads back), and so may the prediction. Pictures are
+        there if one camera alone saw the smoke, and stood still.
         """
         ...
 
     def predict(self, velocity: Velocity, dt: float) -> Velocity:
         """The velocity of the next frame if no force acts, on the grid of the one given: see `predict_velocity`."""
-        ...
-
-    def of_one_view(self) -> "VelocityEstimator":
-        """The estimator for densities that one camera alone saw, standing still; itself if it makes no difference."""
         ...
 
 

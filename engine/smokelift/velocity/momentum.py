@@ -66,16 +66,16 @@ def fit_center(prediction: StaggeredGrid | None, density: Array, linear: Lineari
     dissipation = min(float(found[-1]), 1.0)  # where smoke vanishes the linearized change may ask for more than all
     if dissipation < 0 and prediction is None:
         others = np.delete(np.arange(len(products)), -2)
-        steady, without = _least_squares(products[np.ix_(others, others)])
-        if rest > BRIGHTENING * without:
-            dissipation, found = 0.0, steady
+        without_dissipation, left = _least_squares(products[np.ix_(others, others)])
+        if rest > BRIGHTENING * left:
+            dissipation, found = 0.0, without_dissipation
     momentum = found[: 3 * rows].reshape(rows, 3)
     if prediction is None:
         return Center(_set_in_motion(density, MOMENTUM * momentum, grid), 0.0, dissipation)
     trust = float(np.clip(found[3], 0, 1))
     gained = _set_in_motion(density, momentum, grid)
     faces = zip(gained.faces, prediction.faces, strict=True)
-    return Center(grid.with_faces(own + np.float32(trust) * before for own, before in faces), trust, dissipation)
+    return Center(grid.with_faces(own + np.float32(trust) * predicted for own, predicted in faces), trust, dissipation)
 
 
 def _set_in_motion(density: Array, momentum: npt.NDArray[np.float64], grid: StaggeredGrid) -> StaggeredGrid:

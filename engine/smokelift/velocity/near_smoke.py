@@ -16,7 +16,7 @@ SLAB = 64
 """Voxels across a slab: many more than smoke moves in a step."""
 
 
-def carry(density: Array, velocity: Velocity, dt: float, voxel_size: float, *, conserve: bool = False) -> Array:
+def advect_near(density: Array, velocity: Velocity, dt: float, voxel_size: float, *, conserve: bool = False) -> Array:
     """Carry a density (nx, ny, nz), not negative, along by a velocity of its grid or of one that was halved from it.
 
     It gives what `advect` makes of it with `refine`, but for rounding. ``dt`` is in seconds, ``voxel_size`` of the
@@ -33,7 +33,7 @@ def carry(density: Array, velocity: Velocity, dt: float, voxel_size: float, *, c
     return result
 
 
-def near_smoke(velocity: Velocity, smoke: Mask, dt: float, voxel_size: float) -> Velocity:
+def refine_near_smoke(velocity: Velocity, smoke: Mask, dt: float, voxel_size: float) -> Velocity:
     """Refine a velocity to the grid of the smoke where that can arrive; it is zero elsewhere.
 
     ``smoke`` (nx, ny, nz) marks voxels of ``voxel_size`` meters; ``dt`` is in seconds. The velocity's grid was halved

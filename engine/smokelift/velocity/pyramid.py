@@ -6,12 +6,25 @@ import numpy as np
 from scipy import ndimage
 
 import smokelift._core as _core
-from smokelift.transport import Array, Faces, StaggeredGrid, Velocity, faces_in, without_divergence
+from smokelift.transport import Array, Faces, StaggeredGrid, Velocity, faces_in, halved, without_divergence
+
+COARSEST_SIDE, MIN_SIDE = 30, 8
+"""Voxels along the longest side of the coarsest grid at most, if no side gets shorter than the second. Motion of
+several voxels is found there; and one view leaves the depth undetermined, so that finer velocities of a reconstruction
+follow its errors (docs/experiments/velocity-solver.md)."""
 
 SMOOTHING = 1 / 4
 """Weight of each neighbor along an axis, which leaves nothing of what changes its sign from voxel to voxel.
 
 What a reconstruction's coarse grid shows of that is most often wrong (docs/experiments/velocity-solver.md)."""
+
+
+def default_coarsening(shape: tuple[int, int, int]) -> int:
+    """How many times a grid is halved until its longest side has `COARSEST_SIDE` voxels at most."""
+    count = 0
+    while max(shape) > COARSEST_SIDE and min(shape) >= 2 * MIN_SIDE:
+        count, shape = count + 1, halved(shape)
+    return count
 
 
 def prolong(u: StaggeredGrid, shape: Sequence[int]) -> Faces:

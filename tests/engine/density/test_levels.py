@@ -35,7 +35,7 @@ def large(monkeypatch) -> None:
 
 def level(shot: Shot) -> Level:
     estimate = RoundDepth().of_clip(shot).estimate(ViewSet.of(shot.observe(1), shot.optics, 1))
-    return Level(estimate.views, estimate.inside)
+    return Level(estimate.views, estimate.inside_fraction)
 
 
 def test_a_coarser_grid_covers_the_smoke_once(shot, large) -> None:
@@ -52,12 +52,15 @@ def test_a_coarser_grid_covers_the_smoke_once(shot, large) -> None:
 
 def test_what_stays_there_stays_here(shot, large) -> None:
     fine = level(shot)
+<<<<<<< HEAD
     coarser = fine.coarser
+=======
+>>>>>>> loop
     density = np.zeros(SHAPE, np.float32)
     density[fine.views.hull] = np.random.default_rng(0).random(np.count_nonzero(fine.views.hull), np.float32)
-    np.testing.assert_allclose(coarser.changed(density, fine, lambda means: means), density, rtol=1e-5)
-    np.testing.assert_allclose(coarser.changed(density, fine, lambda means: 3 * means), 3 * density, rtol=1e-5)
-    means = coarser.means(density, fine)
+    np.testing.assert_allclose(fine.changed_on_coarser(density, lambda means: means), density, rtol=1e-5)
+    np.testing.assert_allclose(fine.changed_on_coarser(density, lambda means: 3 * means), 3 * density, rtol=1e-5)
+    means = fine.coarse_means(density)
     assert 8 * means.sum(dtype=np.float64) == pytest.approx(density.sum(dtype=np.float64), rel=1e-5)
 
 

@@ -77,9 +77,9 @@ def test_what_is_known_of_the_side_is_kept(shot) -> None:
     views = ViewSet.of(shot.observe(2), shot.optics, 2)
     estimate = DetailedDepth(RoundDepth()).of_clip(shot).estimate(views)
     found = FIT.fit(views, estimate, None).density
-    layers, kept = (density.sum((0, 1), dtype=np.float64) for density in (found, estimate.detail.smooth))
+    layers, kept = (density.sum((0, 1), dtype=np.float64) for density in (found, estimate.detail.smooth_density))
     assert np.abs(layers - kept).sum() < 0.1 * kept.sum()
-    place, smooth = (float(d.sum((0, 2)) @ np.arange(24) / d.sum()) for d in (found, estimate.detail.smooth))
+    place, smooth = (float(d.sum((0, 2)) @ np.arange(24) / d.sum()) for d in (found, estimate.detail.smooth_density))
     assert place == pytest.approx(smooth, abs=0.6)
 
 
@@ -91,7 +91,7 @@ def lobes(scene: Scene, across: int) -> float:
         views = ViewSet.of(shot.observe(2), shot.optics, 2)
         estimate = DetailedDepth(RoundDepth()).of_clip(shot).estimate(views)
     size = across // 6
-    both = estimate.detail.smooth, estimate.density
+    both = estimate.detail.smooth_density, estimate.density
     smooth, noisy = (density.reshape(6, size, 6, size, 8, size).mean((1, 3, 5)) for density in both)
     smoky = smooth > 0.1 * smooth.max()
     return float(np.log(noisy[smoky] / smooth[smoky]).std())
@@ -132,7 +132,7 @@ def test_what_is_level_is_weakened_and_what_stands_is_not() -> None:
 def test_pictures_of_many_azimuths_add_up_to_detail_without_direction(change, lowest, highest) -> None:
     """As they are they draw level layers: the volume changes more along the height than across it."""
     domain = Domain((-1, -1, -1), (1, 1, 1), (32, 32, 32))
-    table = Turntable.before(Camera.look_at((0, -5, 0), (0, 0, 0), fov_y_degrees=30, size=(32, 32)), domain)
+    table = Turntable.facing(Camera.look_at((0, -5, 0), (0, 0, 0), fov_y_degrees=30, size=(32, 32)), domain)
     volume, random = np.ones((32, 32, 32), np.float32), np.random.default_rng(1)
     smoke = UprightSmoke.of(table, volume)
     for degrees in np.arange(0, 180, 180 / 24):

@@ -1,16 +1,14 @@
-"""How much of the carried density a frame starts from: a share, or its detail with the smooth answer's low pass."""
+"""How much of the carried density a frame starts from: a share, or its detail with the smooth density's low pass."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 from scipy import ndimage
 
-from smokelift.density import DepthEstimate, GuidedSimulation, Observation, RoundDepth, Start, ViewSet
-from smokelift.density.objective import Term
+from smokelift.density import AdvectedDetail, DepthEstimate, Observation, RoundDepth, Start, ViewSet
 from smokelift.density.observation import eight_bit_plate
-from smokelift.density.temporal_prior import LARGEST_GAIN, RETENTION
+from smokelift.density.temporal_prior import MAX_ADVECTED_GAIN, RETENTION
 from smokelift.render import Volume, render, scene_optics
 from smokelift.scene import completed
 
@@ -30,10 +28,8 @@ class Moment:
         return self.depth.density
 
     def start(self, carried: Volume, smooth: Volume | None = None) -> Start:
-        """Where the fit starts with a carried density, which is its own smooth answer unless that is given."""
-        return GuidedSimulation(BLEND).start(
-            self.depth.views, self.depth, carried, carried if smooth is None else smooth
-        )
+        """Where the fit starts with a carried density, which is its own smooth density unless that is given."""
+        return AdvectedDetail(BLEND).start(self.depth, carried, carried if smooth is None else smooth)
 
 
 @pytest.fixture(scope="module")
@@ -70,9 +66,9 @@ class Lobes:
     """Detail whose lobes are some voxels wide."""
 
     views: ViewSet
-    smooth: Volume
+    smooth_density: Volume
 
-    def added(self, density: Volume, cameras: Sequence[Term], *, fresh: bool) -> Volume:
+    def added(self, density: Volume, *, fresh: bool) -> Volume:
         return density
 
     def low_pass(self, density: Volume) -> np.ndarray:
@@ -81,14 +77,14 @@ class Lobes:
 
 @pytest.fixture(scope="module")
 def detailed(moment) -> Moment:
-    """The same with a depth prior that has made something up: its smooth answer beside a density."""
+    """The same with a depth prior that has made something up: its smooth density beside a density."""
     density = 0.9 * moment.prior + 0.1 * blurred(moment.prior)
     detail = Lobes(moment.depth.views, moment.prior)
     return replace(moment, depth=replace(moment.depth, density=density, detail=detail))
 
 
 def test_a_simulation_is_guided_to_the_smooth_answers_low_pass(moment, detailed) -> None:
-    """Coarsely the start is the smooth answer, finely it is what was carried, however much that was."""
+    """Coarsely the start is the smooth density, finely it is what was carried, however much that was."""
     hull = moment.depth.views.hull
     starts = [detailed.start(np.float32(factor) * moment.true, moment.prior).density for factor in (1.0, 8.0)]
     wanted, found = blurred(moment.prior)[hull], blurred(starts[0])[hull]
@@ -104,7 +100,7 @@ def test_detail_is_born_where_nothing_is_carried(moment, detailed) -> None:
     np.testing.assert_array_equal(empty.density[hull], detailed.prior[hull])
     assert empty.figures["share"] == 0
     little = detailed.start(np.float32(0.01) * moment.prior)
-    assert 0 < little.figures["share"] <= 0.011 * LARGEST_GAIN
+    assert 0 < little.figures["share"] <= 0.011 * MAX_ADVECTED_GAIN
     np.testing.assert_allclose(little.density.sum(), detailed.prior[hull].sum(), rtol=0.02)
     assert detailed.start(moment.prior).figures["share"] == pytest.approx(RETENTION, rel=0.02)
 

@@ -13,14 +13,14 @@ CAMERA = Camera.look_at((3, -4, 1.1), (0, 0, 0.8), fov_y_degrees=27, size=(40, 5
 
 @pytest.mark.parametrize("degrees", [-30.0, 0.0, 45.0, 90.0, 135.0])
 def test_a_camera_is_where_it_is_turned_to(degrees) -> None:
-    turntable = Turntable.before(CAMERA, DOMAIN)
+    turntable = Turntable.facing(CAMERA, DOMAIN)
     assert turntable.degrees(turntable.camera(degrees)) == pytest.approx(degrees)
     assert turntable.degrees(orbit(CAMERA, DOMAIN, degrees)) == pytest.approx(degrees)
 
 
 @pytest.mark.parametrize("degrees", range(0, 180, 15))
 def test_the_domain_fits_into_every_picture_at_a_pixel_a_voxel(degrees) -> None:
-    turntable = Turntable.before(CAMERA, DOMAIN)
+    turntable = Turntable.facing(CAMERA, DOMAIN)
     camera = turntable.camera(degrees)
     pixels, _ = project_points(camera, DOMAIN.corners())
     assert (pixels > -1e-6).all()
@@ -31,7 +31,7 @@ def test_the_domain_fits_into_every_picture_at_a_pixel_a_voxel(degrees) -> None:
 
 def test_the_screen_shows_what_stands_on_it_where_it_stands() -> None:
     """A point of the screen in the camera's picture comes back to the pixel of the turntable's own front camera."""
-    turntable = Turntable.before(CAMERA, DOMAIN)
+    turntable = Turntable.facing(CAMERA, DOMAIN)
     point = np.array(DOMAIN.centre) + 0.25 * turntable.lateral + 0.35 * turntable.height
     picture = np.zeros(CAMERA.size[::-1], np.float32)
     (x, y), _ = project_points(CAMERA, point)
@@ -47,7 +47,7 @@ def test_a_volume_comes_back_from_standing_upright(axis) -> None:
     camera = Camera.look_at((3, -4, 1.1), (0, 0, 0.8), up=(0, 0, -1), fov_y_degrees=27, size=(40, 56))
     volume = np.random.default_rng(0).random(DOMAIN.resolution, np.float32)
     for each in (CAMERA, camera):
-        turntable = Turntable.before(each, DOMAIN, axis)
+        turntable = Turntable.facing(each, DOMAIN, axis)
         assert turntable.axis == axis
         assert turntable.upright(volume).shape[2] == DOMAIN.resolution[axis]
         np.testing.assert_array_equal(turntable.lying(turntable.upright(volume)), volume)
@@ -56,7 +56,7 @@ def test_a_volume_comes_back_from_standing_upright(axis) -> None:
 @pytest.mark.parametrize("degrees", [0.0, 20.0, 45.0, 90.0, 137.0])
 def test_even_smoke_makes_an_even_picture(degrees) -> None:
     domain = Domain((-1, -1, 0), (1, 1, 0.5), (64, 64, 16))
-    turntable = Turntable.before(CAMERA, domain)
+    turntable = Turntable.facing(CAMERA, domain)
     x, y, _ = domain.offsets(domain.centre)
     volume = np.broadcast_to(np.clip((0.8 - np.hypot(x, y)) / domain.voxel_size + 0.5, 0, 1), domain.resolution)
     picture = UprightSmoke.of(turntable, turntable.upright(np.ascontiguousarray(volume, np.float32))).picture(degrees)
@@ -69,7 +69,7 @@ def test_even_smoke_makes_an_even_picture(degrees) -> None:
 
 def test_a_projection_and_its_scale_are_adjoint() -> None:
     """Small exponents change a sum as the picture's product with them says, also of a part of the domain."""
-    turntable = Turntable.before(CAMERA, DOMAIN)
+    turntable = Turntable.facing(CAMERA, DOMAIN)
     random = np.random.default_rng(1)
     whole = turntable.upright(random.random(DOMAIN.resolution, np.float32))
     part = np.ascontiguousarray(whole[5:20, 3:12])
@@ -88,7 +88,7 @@ def test_only_columns_that_hold_something_are_worked_on() -> None:
     volume[1, 2, 3:6] = 1
     volume[1, 2, 4] = 0
     volume[4, 0, 8] = 2
-    turntable = Turntable.before(CAMERA, Domain((0, 0, 0), (5, 4, 9), (5, 4, 9)))
+    turntable = Turntable.facing(CAMERA, Domain((0, 0, 0), (5, 4, 9), (5, 4, 9)))
     smoke = UprightSmoke.of(turntable, volume)
     spans = smoke.spans
     assert {tuple(map(int, at)): tuple(spans[at]) for at in np.ndindex(5, 4) if np.diff(spans[at])[0]} == {

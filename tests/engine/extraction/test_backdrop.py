@@ -95,7 +95,7 @@ def test_what_follows_a_cut_is_not_behind_the_smoke(tmp_path) -> None:
         write_image(tmp_path / f"frame_{n:03d}.png", srgb_to_linear(shown))
     clip = Clip.open(tmp_path / "frame_###.png", fps=24, frames=(4, 8))
     found = find_backdrop(clip, None, None)
-    assert found.shot == (0, 13)
+    assert found.uncut_span == (0, 13)
     assert np.percentile(codes_apart(found.plate.at(0).image, truth), 95) < 8
 
 

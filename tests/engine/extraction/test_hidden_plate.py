@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from smokelift.extraction.hidden_plate import SIDE, SomeFrames, in_turn, is_known, likeliest, plate_and_source
+from smokelift.extraction.hidden_plate import SIDE, SomeFrames, in_turn, is_known, likeliest_plate, plate_and_source
 from smokelift.extraction.plate import Plate
 from smokelift.footage.images import Picture, area_average, blurred
 from smokelift.footage.noise import EIGHT_BIT_NOISE
@@ -57,7 +57,7 @@ def continued(behind: Picture) -> Plate:
 
 def after_turns(clip: Pictures, plate: Plate, source: Picture) -> Plate:
     frames = SomeFrames.of(clip, plate, range(FRAMES), SIDE)
-    return frames.with_plate(plate, in_turn(frames, likeliest(frames, source)))
+    return frames.with_plate(plate, in_turn(frames, likeliest_plate(frames, source)))
 
 
 def off(plate: Plate, behind: Picture) -> float:
@@ -126,7 +126,7 @@ def test_frames_are_likeliest_with_the_smokes_own_source() -> None:
     behind = wall()
     clip = filmed(behind, list(np.linspace(40, 152, FRAMES)), 3.0)
     frames = SomeFrames.of(clip, continued(behind), range(FRAMES), SIDE)
-    own, dim, bright = (likeliest(frames, factor * SOURCE).loss for factor in np.float32((1, 0.4, 2.5)))
+    own, dim, bright = (likeliest_plate(frames, factor * SOURCE).loss for factor in np.float32((1, 0.4, 2.5)))
     assert own < min(dim, bright)
 
 

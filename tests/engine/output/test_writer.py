@@ -21,7 +21,7 @@ from smokelift.output.files import PICTURES
 from smokelift.output.index import SequenceError
 from smokelift.output.resume import ResumeState
 from smokelift.output.sequence import Sequence
-from smokelift.output.writer import SequenceWriter
+from smokelift.output.writer import SequenceWriter, count_finished
 from smokelift.transport import face_shapes
 
 COARSER, DARK = {**SETTINGS, "density": {"iterations": 13}}, replace(SCENE, lights=())
@@ -153,11 +153,12 @@ def test_a_frame_without_its_state_is_made_again(tmp_path, no_vdb) -> None:
         writer.write(3, *frame(3))
         raise CutOffError
     (tmp_path / "resume.npz").write_bytes(older)
+    assert Sequence.open(tmp_path).frames == (1, 2, 3) and count_finished(tmp_path) == 2
     with SequenceWriter(tmp_path, SCENE, SETTINGS, npz=True, resume=True) as writer:
         assert writer.finished == (1, 2)
         assert writer.state.number == 2
         writer.write(3, *frame(3))
-    assert Sequence.open(tmp_path).frames == (1, 2, 3)
+    assert Sequence.open(tmp_path).frames == (1, 2, 3) and count_finished(tmp_path) == 3
 
 
 @pytest.mark.parametrize(

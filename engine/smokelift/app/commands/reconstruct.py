@@ -19,11 +19,10 @@ from smokelift.app.progress import Reporter, seconds_before
 from smokelift.checks import Figures, Finding
 from smokelift.checks.whole_files import atomic_path
 from smokelift.footage.clip import Clip
-from smokelift.output.files import INDEX, MAX_START_NUMBER
+from smokelift.output.files import MAX_START_NUMBER
 from smokelift.output.images import eight_bit
 from smokelift.output.index import median_psnr
-from smokelift.output.sequence import Sequence
-from smokelift.output.writer import check_directory, written_kinds
+from smokelift.output.writer import check_directory, count_finished, written_kinds
 from smokelift.pipeline import Frame, reconstruct
 from smokelift.render import device
 from smokelift.report.cost import Workload, estimate_cost, frames_seconds, moment, require_memory
@@ -68,8 +67,7 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
         require_memory(resolution, work, given=isinstance(scene.domain, Domain))
         for finding in (*shot.findings, *expected_shortcomings(shot), *made_up(shot)):
             say.note(finding)
-        goes_on, new = options.resume and (options.out / INDEX).is_file(), set[int]()
-        finished = len(Sequence.open(options.out).frames) if goes_on else 0
+        finished, new = count_finished(options.out) if options.resume else 0, set[int]()
         seconds = frames_seconds(resolution, work) * (1 - finished / shot.length)
         say.start(
             shot.length,
@@ -121,7 +119,7 @@ def _write_thumbnail(path: Path, shot: Shot, frame: Frame) -> None:
     if not observations:  # the frame shows nothing of the domain: the last picture stays
         return
     seen = observations[0]
-    found = shot.optics.renderer(seen.camera, seen.plate.image).image(frame.density)
+    found = shot.optics.renderer(seen.camera, seen.clean_plate.image).image(frame.density)
     rows, columns = seen.image.shape[:2]
     both = np.concatenate([seen.image, found], 0 if columns > rows else 1)
     with atomic_path(path) as aside:

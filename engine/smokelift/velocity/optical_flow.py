@@ -26,7 +26,6 @@ from smokelift.checks import Array
 from smokelift.scene import Camera, Domain
 from smokelift.scene.projection import project_points
 from smokelift.transport import Velocity, on_faces, without_divergence
-from smokelift.velocity.pyramid import coarsen_density
 
 CURVATURE, REST = 0.05, 0.14
 """Weights, for each pixel of a cell, of a correction's squared Laplacian from cell to cell and of its square
@@ -46,24 +45,32 @@ REACH = 2.5
 """Reach of the average, in standard deviations."""
 
 
-def with_seen_motion(
-    velocity: Velocity, before: Array, after: Array, camera: Camera, domain: Domain, density: Array, dt: float
-) -> Velocity:
+@dataclass(frozen=True, eq=False)
+class PicturePair:
+    """Two pictures of smoke that one camera alone saw, standing still.
+
+    `before` and `after` (rows, columns) are roots of optical depths, so that thin smoke counts; `domain` is the box
+    that holds the smoke.
+    """
+
+    before: Array
+    after: Array
+    camera: Camera
+    domain: Domain
+
+
+def correct_by_optical_flow(velocity: Velocity, pictures: PicturePair, density: Array, dt: float) -> Velocity:
     """A velocity that moves the smoke in the picture as the camera saw it move, averaged along the line of sight.
 
-    The velocity is on the density's grid or on one that was halved from it. `before` and `after` (rows, columns)
-    are roots of the optical depths in two frames of the camera, `dt` seconds apart; domain and density (nx, ny, nz) are
-    those of the second.
+    The density (nx, ny, nz) is that of the second picture, on the velocity's grid; `dt` seconds lie between both.
     """
+    camera, domain = pictures.camera, pictures.domain
     middle = np.array(domain.centre)
     ray = np.array(camera.matrix)[:3, 2] if camera.type == "orthographic" else middle - camera.position
-    smoke = after > 0
-    if smoke.any() and before.any():
-        while density.shape != velocity.shape:
-            density = coarsen_density(density)
+    if pictures.after.any() and pictures.before.any():
         image, scale = _ImageGrid.of(camera, domain, velocity.shape, velocity.voxel_size), dt / velocity.voxel_size
         motion = image.mean_motion(velocity.centres() * np.float32(scale), density)
-        correction = image.lifted(_correction(image, motion, before, after, smoke)) / np.float32(scale)
+        correction = image.lifted(_correction(image, motion, pictures)) / np.float32(scale)
         faces = zip(velocity.faces, on_faces(correction), strict=True)
         velocity = velocity.with_faces(component + added for component, added in faces)
     return averaged_along(velocity, (float(ray[0]), float(ray[1]), float(ray[2])))
@@ -94,22 +101,22 @@ def _line(direction: NDArray[np.float64], deviation: float) -> Array:
     return np.asarray(kernel / kernel.sum(), np.float32)
 
 
-def _correction(
-    image: "_ImageGrid", motion: NDArray[np.float64], before: Array, after: Array, smoke: NDArray[np.bool_]
-) -> Array:
+def _correction(image: "_ImageGrid", motion: NDArray[np.float64], pictures: PicturePair) -> Array:
     """What the motion (cells, 2) of the picture lacks, in columns and rows per frame."""
+    before, after = pictures.before, pictures.after
+    smoke = after.ravel() > 0
     columns, rows = (image.pixels @ motion).T.reshape(2, *after.shape)
     down, across = np.indices(after.shape)
     carried = ndimage.map_coordinates(before, (down - rows, across - columns), order=1, mode="nearest")
     mean = (carried + after) / 2  # correlated, since a picture may be a single row
     gradient = [ndimage.correlate1d(mean, (-0.5, 0, 0.5), axis, mode="nearest").ravel() for axis in (1, 0)]
-    steepness = float(np.mean(sum(part[smoke.ravel()] ** 2 for part in gradient)))
+    steepness = float(np.mean(sum(part[smoke] ** 2 for part in gradient)))
     if steepness == 0:
         return np.zeros(motion.shape, np.float32)
     steep = np.flatnonzero((gradient[0] != 0) | (gradient[1] != 0))  # the others say nothing
     pixels = image.pixels[steep]
     along = sparse.hstack([pixels.multiply(part[steep, None]) for part in gradient]).tocsr()
-    normal = (along.T @ along / steepness + sparse.block_diag([image.stiffness] * 2)).tocsr()
+    normal = (along.T @ along / steepness + sparse.block_diag([image.penalty] * 2)).tocsr()
     right = along.T @ (carried - after).ravel()[steep] / steepness
     found, _ = cg(normal, right, rtol=TOLERANCE, maxiter=MAX_STEPS, M=sparse.diags(1 / normal.diagonal()))
     # sums may be taken in another order on another day, and a run has to be the same to the bit
@@ -130,7 +137,7 @@ class _ImageGrid:
     grid."""
     least: NDArray[np.float64]
     """(voxels, 3, 2): the least motion in the grid for each column and row."""
-    stiffness: sparse.csr_matrix
+    penalty: sparse.csr_matrix
     """What a correction costs beside what it explains."""
 
     @staticmethod
@@ -154,9 +161,9 @@ class _ImageGrid:
             for down, across in ((rows, columns), (at[:, 1], at[:, 0]))
         )
         laplacian = sparse.kronsum(*(_differences(count) for count in counts[::-1]))
-        stiffness = CURVATURE * laplacian @ laplacian + REST * sparse.identity(counts[0] * counts[1])
-        stiffness *= sizes[0] * sizes[1]
-        return _ImageGrid(shape, pixels, voxels, moved, np.linalg.pinv(moved), stiffness.tocsr())
+        penalty = CURVATURE * laplacian @ laplacian + REST * sparse.identity(counts[0] * counts[1])
+        penalty *= sizes[0] * sizes[1]
+        return _ImageGrid(shape, pixels, voxels, moved, np.linalg.pinv(moved), penalty.tocsr())
 
     def mean_motion(self, motion: Array, density: Array) -> NDArray[np.float64]:
         """Mean along the rays (cells, 2), in columns and rows per frame, of a motion (nx, ny, nz, 3) in voxels."""

@@ -11,7 +11,7 @@ from smokelift.scene import Camera, Domain, look_at_matrix
 from smokelift.scene.projection import project_points
 from smokelift.setup.settings import Settings
 from smokelift.transport import Velocity, face_shapes, on_faces, project
-from smokelift.velocity.seen_motion import averaged_along, with_seen_motion
+from smokelift.velocity.optical_flow import PicturePair, averaged_along, correct_by_optical_flow
 from tests.engine.transport.random_fields import random_velocity, uniform
 
 DT = 1 / 24
@@ -39,8 +39,8 @@ def seen(velocity: Velocity, across: float, up: float, kind: str) -> Velocity:
     """The velocity corrected by a texture that moves so many pixels per frame to the right and upwards."""
     before = texture()
     after = ndimage.shift(before, (-up, across), order=3, mode="nearest")
-    density = np.ones(DOMAIN.resolution, np.float32)
-    return with_seen_motion(velocity, before, after, camera(kind), DOMAIN, density, DT)
+    pictures = PicturePair(before, after, camera(kind), DOMAIN)
+    return correct_by_optical_flow(velocity, pictures, np.ones(COARSE, np.float32), DT)
 
 
 def rest() -> Velocity:
@@ -75,15 +75,15 @@ def test_it_has_no_divergence_and_keeps_what_is_known() -> None:
 
 
 @pytest.mark.parametrize("picture", [np.zeros((60, 40), np.float32), np.ones((60, 40), np.float32)])
-def test_a_picture_without_smoke_or_structure_corrects_nothing(picture) -> None:
-    density = np.zeros(DOMAIN.resolution, np.float32)
-    found = with_seen_motion(rest(), picture, picture, camera("perspective"), DOMAIN, density, DT)
+def test_a_picture_without_smoke_or_structure_corrects_nothing(picture: np.ndarray) -> None:
+    pictures = PicturePair(picture, picture, camera("perspective"), DOMAIN)
+    found = correct_by_optical_flow(rest(), pictures, np.zeros(COARSE, np.float32), DT)
     assert not any(component.any() for component in found.faces)
 
 
-def test_the_paper_follows_no_picture() -> None:
-    assert compose(Settings.preset()).follows_picture
-    assert not compose(Settings.preset(method="paper")).follows_picture
+def test_the_paper_uses_no_optical_flow() -> None:
+    assert compose(Settings.preset()).optical_flow
+    assert not compose(Settings.preset(method="paper")).optical_flow
 
 
 @pytest.mark.parametrize("size", [(1, 1), (1, 9), (9, 1)])
@@ -91,8 +91,8 @@ def test_a_picture_may_be_a_single_row_or_column(size) -> None:
     domain = Domain((-0.1, -0.1, 0.0), (0.1, 0.1, 0.2), (1, 1, 1))
     before, after = np.random.default_rng(0).random((2, *size[::-1]), np.float32)
     velocity = Velocity.zero(domain.resolution, domain.voxel_size)
-    seen_by = camera("perspective").resized(*size)
-    found = with_seen_motion(velocity, before, after, seen_by, domain, np.ones((1, 1, 1), np.float32), DT)
+    pictures = PicturePair(before, after, camera("perspective").resized(*size), domain)
+    found = correct_by_optical_flow(velocity, pictures, np.ones((1, 1, 1), np.float32), DT)
     assert all(np.isfinite(component).all() for component in found.faces)
 
 
