@@ -203,19 +203,30 @@ class Snapshot:
     source: Take | None  # the other take; None likewise
     options: list[str] | None  # the engine's further options; None where the request is missing or damaged
     title: str  # the name that the artist gave it, or its number
-    index: dict[str, Any] | None  # `sequence.json`, not to be changed; None before there is one, or of a foreign one
+    index: dict[str, Any]  # `sequence.json`, not to be changed; empty before there is one, or of a foreign one
+    numbers: list[int]  # those of the finished frames
     begun: bool  # whether it has what a run needs
     files: frozenset[Path] | None  # .blend files, without links, that may show it; None where a list was never kept
 
     @property
     def frames(self) -> int:
         """Number of finished frames."""
-        return len(self.index["frames"]) if self.index else 0
+        return len(self.numbers)
+
+    @property
+    def file_numbers(self) -> list[int]:
+        """The numbers in the names of their files; the engine of earlier versions counts from 1."""
+        return [number + self.index.get("start_number", 1) - 1 for number in self.numbers]
+
+    @property
+    def scene(self) -> Any:
+        """The tables of its scene as the engine completed them, where there is an index."""
+        return self.index["scene"]
 
     @property
     def complete(self) -> bool:
         """Whether all frames are finished."""
-        return bool(self.index and self.index["complete"])
+        return bool(self.index.get("complete"))
 
     @property
     def resumable(self) -> bool:
@@ -238,6 +249,8 @@ def _file_state(file: Path) -> FileState:
 def _snapshot_at(take: Take, request_state: FileState, _index_state: FileState, scene_state: FileState) -> Snapshot:
     """The snapshot of a take whose files are in these states."""
     request, index = _json(take.request_file), _json(take.directory / INDEX_FILE)
+    if "complete" not in index or not isinstance(index.get("frames"), dict):
+        index = {}
     direction, there, options = (request.get(key) for key in ("direction", "source", "options"))
     if not isinstance(direction, str) or direction not in DIRECTIONS:
         direction = None
@@ -252,7 +265,8 @@ def _snapshot_at(take: Take, request_state: FileState, _index_state: FileState, 
         source=source,
         options=None if options is None else [str(word) for word in options],
         title=str(request.get("title", "")) or f"{TITLES.get(direction or '', 'Take')} {number}",
-        index=index if "complete" in index and isinstance(index.get("frames"), dict) else None,
+        index=index,
+        numbers=sorted(map(int, index["frames"])) if index else [],
         begun=request_state is not None and (direction is not None or scene_state is not None),
         files=frozenset((folder / str(file)).resolve() for file in files) if isinstance(files, list) else None,
     )

@@ -44,63 +44,45 @@ def _background_chosen(settings: bpy.types.PropertyGroup, _context: bpy.types.Co
 class ClipSettings:
     """The clip, what is behind its smoke, and where its smoke may be."""
 
-    clip: link("Clip", "Footage of smoke: a video or an image sequence", bpy.types.MovieClip, update=_clip_chosen)
-    first: whole(
-        "First",
-        "First frame of the clip to use, counted from 1 as Blender does; the command line counts from 0",
-        default=1,
-        min=1,
+    clip: link("Clip", bpy.types.MovieClip, update=_clip_chosen)("Footage of smoke: a video or an image sequence")
+    first: whole("First", default=1, min=1)(
+        "First frame of the clip to use, counted from 1 as Blender does; the command line counts from 0"
     )
-    last: whole(
-        "Last",
-        "Last frame of the clip to use, counted from 1 as Blender does; the command line counts from 0",
-        default=1,
-        min=1,
+    last: whole("Last", default=1, min=1)(
+        "Last frame of the clip to use, counted from 1 as Blender does; the command line counts from 0"
     )
-    plate_mode: choice(
-        "Background",
+    plate_mode: choice("Background", update=_background_chosen)(
         "The picture without smoke",
         ("ESTIMATE", "From the Clip", "Estimate the background from frames where no smoke covers it"),
         ("FILE", "Clean Plate", "Picture of the same view without smoke; for a moving camera, one for each frame"),
         ("FRAMES", "Frames", "Frames of the clip in which there is no smoke"),
         ("COLOR", "Color", "One color, as behind stock footage on black; at first the one that the clip shows"),
-        update=_background_chosen,
     )
-    plate_color: vector(
-        "Background Color", "Color of all that is behind the smoke", subtype="COLOR", min=0.0, soft_max=1.0
+    plate_color: vector("Background Color", subtype="COLOR", min=0.0, soft_max=1.0)(
+        "Color of all that is behind the smoke"
     )
-    plate: string(
-        "Clean Plate",
+    plate: string("Clean Plate")(
         "Picture of the same view without smoke. For a moving camera: a video, or the first image of a sequence, with "
-        "one image for each frame of the clip",
+        "one image for each frame of the clip"
     )
-    plate_frames: string("Frames", "Frames of the clip without smoke, counted from 1 and separated by commas")
-    strokes: link(
-        "Strokes",
+    plate_frames: string("Frames")("Frames of the clip without smoke, counted from 1 and separated by commas")
+    strokes: link("Strokes", bpy.types.Image)(
         "Image of the clip's size: painted green where smoke is, red where none is, blue where a pixel shows the "
-        "background. Nothing is said of the rest, which is transparent",
-        bpy.types.Image,
+        "background. Nothing is said of the rest, which is transparent"
     )
-    drawn_mask: link(
-        "Mask",
+    drawn_mask: link("Mask", bpy.types.Mask)(
         "Mask of the Clip Editor: smoke may be inside its lines, or outside those of a layer that is inverted, and "
-        "nowhere else, whatever moves there",
-        bpy.types.Mask,
+        "nowhere else, whatever moves there"
     )
-    mask: string(
-        "Mask File",
+    mask: string("Mask File")(
         "Picture that is white where smoke may be and black where none is, whatever moves there; or a video, or "
-        "mask_####.png, with one for each frame of the clip",
+        "mask_####.png, with one for each frame of the clip"
     )
-    fps: number(
-        "Frame Rate",
-        "Frame rate at which the clip was filmed, if it plays in slow motion; automatic is the clip's own",
-        min=0.0,
-        soft_max=1000.0,
+    fps: number("Frame Rate", min=0.0, soft_max=1000.0)(
+        "Frame rate at which the clip was filmed, if it plays in slow motion; automatic is the clip's own"
     )
     use_fps: automatic_unless("fps", "Frame Rate", 120.0)
-    transfer: choice(
-        "Color Space",
+    transfer: choice("Color Space")(
         "Color space of the clip",
         ("AUTO", "From the Clip", "As the clip's settings in the Movie Clip Editor say"),
         ("srgb", "sRGB", "Ordinary video and pictures"),

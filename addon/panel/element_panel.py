@@ -57,8 +57,7 @@ def _strokes(smoke: bpy.types.Object) -> bpy.types.Image:
     return image
 
 
-MEANS = choice(
-    "Means",
+MEANS = choice("Means")(
     "What is painted",
     ("SMOKE", "Smoke", "There is smoke here", "COLORSET_03_VEC", 0),
     ("NOT_SMOKE", "Not Smoke", "There is no smoke here, whatever moves", "COLORSET_01_VEC", 1),

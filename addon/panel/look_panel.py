@@ -21,14 +21,14 @@ _needs_look = Need(
 PRESETS = [(key, name, description) for key, (name, description, _) in look.PRESETS.items()]
 
 
-@operator("Use Look", _needs_look, bl_options=UNDO, given={"preset": choice("Preset", "Kind of smoke", *PRESETS)})
+@operator("Use Look", _needs_look, bl_options=UNDO, given={"preset": choice("Preset")("Kind of smoke", *PRESETS)})
 def use_look(context: bpy.types.Context, _smoke: bpy.types.Object, preset: str) -> None:
     """Set density, brightness, colors and edges of the smoke. What was fitted to the clip stays"""
     smoke = smoke_with_look(context.scene)
-    index = volume.shown_take(smoke).read().index
-    if index is None:
+    now = volume.shown_take(smoke).read()
+    if not now.index:
         raise ShotError("The smoke's files are missing: make it again.")
-    if not look.use_preset(smoke, preset, index["scene"]["medium"]["anisotropy"]):
+    if not look.use_preset(smoke, preset, now.scene["medium"]["anisotropy"]):
         raise ShotError("The smoke's material is your own: remove it and show the result again for presets.")
 
 

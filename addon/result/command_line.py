@@ -43,7 +43,7 @@ def main(words: Sequence[str]) -> int:
         if take is not None:
             smoke_takes.update_moved_files(smoke, take)
         take = take or smoke_takes.write_take(smoke)
-        before = volume.frames_before_take(smoke, take)
+        before = volume.frames_before(smoke, take)
         words = engine_command(take.arguments() + thread_options())
         job = Job(words, take.log_file, before, take.read().frames)
     except ShotError as error:

@@ -30,7 +30,7 @@ def enqueue(smoke: bpy.types.Object, take: Take, settings: str = "") -> None:
         raise
     shot_check.make_way()
     done, uid = take.read().frames, smoke.session_uid
-    job = Job(words, take.log_file, volume.frames_before_take(smoke, take), done)
+    job = Job(words, take.log_file, volume.frames_before(smoke, take), done)
     runs[:] = [run for run in runs if run.smoke != uid or not run.job.ended]
     runs.append(Run(take, uid, job, (done, False), settings))
     work()

@@ -190,11 +190,11 @@ def unfinished(smoke: bpy.types.Object) -> Take | None:
 
 def present(smoke: bpy.types.Object, take: Take) -> str:
     """Show a take's finished frames, and the camera that was assumed; returns a sentence on what else has changed."""
-    index, first = take.read().index, volume.shown_take(smoke) is None
-    if not volume.show(smoke, take) or index is None:
+    now, first = take.read(), volume.shown_take(smoke) is None
+    if not volume.show(smoke, take):
         return ""
     assumed = shot_setup.assumed_camera(smoke) is not None
-    if index["complete"] or take.read().direction is None:  # how long a directed one becomes is not known before
+    if now.complete or now.direction is None:  # how long a directed one becomes is not known before
         shot_setup.follow_range(smoke)
     hidden = first and assumed and hide_default_cube(scene_of(smoke))
     return rpt_("The cube of the new file is hidden: it stands where the smoke does.") if hidden else ""

@@ -14,7 +14,7 @@ from .box import engine_to_world
 from .nodes import Socket, Tree, color, feed, file_group, number
 from .plate import plate_image, shown_background, synchronize_plate
 from .smoke import scene_of
-from .volume import shown_index
+from .volume import shown
 
 GROUP = "Smokelift Composite"  # name of the node group, and of its node in the scene's compositor
 MARK = "smokelift_composite"  # custom property by which the group is known under any name
@@ -51,12 +51,12 @@ def composite(smoke: bpy.types.Object) -> None:
         scene[_ENGINE] = scene.render.engine
         scene.render.engine = "CYCLES"  # EEVEE has no shadow catcher
     scene.render.film_transparent = True
-    _catch_shadow(scene, smoke, shown_index(smoke)["scene"]["domain"])
+    _catch_shadow(scene, smoke, shown(smoke).scene["domain"])
     _hold_out(scene)
-    tree, shown = compositor(scene)
+    tree, output = compositor(scene)
     node = tree.nodes.get(GROUP)
     if node is None:
-        node = _insert(tree, shown)
+        node = _insert(tree, output)
     elif node.mute:
         _show(scene, node, True)
     _connect_plate(tree, node, smoke)

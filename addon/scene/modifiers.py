@@ -92,9 +92,9 @@ def in_viewport(smoke: bpy.types.Object) -> bpy.types.Volume:
     return proxy if proxy is not None and modifier.show_viewport else smoke.data
 
 
-def lacks_proxy(smoke: bpy.types.Object, index: Mapping[str, Any]) -> bool:
-    """Whether a smoke is large for a viewport and has no proxy, as an earlier result; ``index`` is that of its take."""
-    return PROXY.modifier(smoke) is None and math.prod(index["scene"]["domain"]["resolution"]) >= PROXY_VOXELS
+def lacks_proxy(smoke: bpy.types.Object, domain: Mapping[str, Any]) -> bool:
+    """Whether a smoke of a domain is large for a viewport and has no proxy, as an earlier result."""
+    return PROXY.modifier(smoke) is None and math.prod(domain["resolution"]) >= PROXY_VOXELS
 
 
 def fit_proxy(smoke: bpy.types.Object, take: Take, numbers: list[int]) -> None:

@@ -57,7 +57,7 @@ def _clean_frames(settings: bpy.types.PropertyGroup) -> list[int]:
 
 def shown_background(smoke: bpy.types.Object) -> dict[str, Any]:
     """The table of the background of the result on show; empty where black was assumed."""
-    return volume.shown_index(smoke)["scene"].get("background") or {}
+    return volume.shown(smoke).scene.get("background") or {}
 
 
 def plate_image(smoke: bpy.types.Object) -> bpy.types.Image:
@@ -146,7 +146,7 @@ def synchronize_plate(smoke: bpy.types.Object, image: bpy.types.Image, user: Any
 
     The user, an image user or a node of the compositor, says which of them is shown.
     """
-    clip, tracked = smoke.smokelift.clip, "matrices" in volume.shown_index(smoke)["scene"]["camera"]
+    clip, tracked = smoke.smokelift.clip, "matrices" in volume.shown(smoke).scene["camera"]
     number = re.search(r"(\d+)\.\w+$", image.filepath)
     if tracked and image.source == "FILE" and number:
         image.source = "SEQUENCE"

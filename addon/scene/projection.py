@@ -14,7 +14,7 @@ from .box import engine_to_world
 from .nodes import Input, Tree, add_node, empty_material, file_group, math_node, number, vector_node
 from .plate import show_plate
 from .smoke import scene_of
-from .volume import frames_before, shown_index
+from .volume import frames_before, shown, shown_take
 
 MATERIAL = "Smokelift Projection"  # name of the material, and of the node group in it
 MARK = "smokelift_projection"  # custom property by which material and group are known under any name
@@ -34,7 +34,7 @@ CARD_WIDTHS = 2.0  # width of the card over the picture's there: room for a came
 
 def project(smoke: bpy.types.Object) -> None:
     """Project the plate of the result on show; a second time changes it and what the artist left as it was."""
-    scene, tables = scene_of(smoke), shown_index(smoke)["scene"]
+    scene, tables = scene_of(smoke), shown(smoke).scene
     scene.render.film_transparent = False
     projector = _projector(smoke, tables["camera"])
     material = _material(projector, tables["camera"])
@@ -73,7 +73,7 @@ def _projector(smoke: bpy.types.Object, table: dict[str, Any]) -> bpy.types.Obje
     if len(poses) == 1:
         set_unless_changed(projector, "place", projector, "matrix_basis", poses[0])
     else:
-        first = smoke.smokelift.clip.frame_start + frames_before(smoke.smokelift, shown_index(smoke))
+        first = smoke.smokelift.clip.frame_start + frames_before(smoke, shown_take(smoke))
         _animate(projector, poses, first)
     return projector
 

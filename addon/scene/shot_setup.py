@@ -62,7 +62,7 @@ def _set_range(scene: bpy.types.Scene, set_value: Callable[[bpy.types.ID, str, A
 
 def set_up(smoke: bpy.types.Object) -> list[str]:
     """Make renders match the clip from the camera, in the ticked parts; returns what to know of it, a sentence each."""
-    settings, scene, index = smoke.smokelift, scene_of(smoke), volume.shown_index(smoke)
+    settings, scene, fitted = smoke.smokelift, scene_of(smoke), volume.shown(smoke).scene
     said = []
     if settings.set_up_plate:
         _disable_other_plates(smoke)  # first: what it gives back may be set up anew
@@ -80,9 +80,9 @@ def set_up(smoke: bpy.types.Object) -> list[str]:
         if scene.cycles.use_denoising and not has_denoiser():  # or F12 ends in an error
             scene.cycles.use_denoising = False
             said.append(rpt_("Denoise is off, since this Blender has no denoiser: more Max Samples make less noise."))
-        _scatter_as_fitted(scene, index)
+        _scatter_as_fitted(scene, fitted)
         estimated = settings.light_mode == "ESTIMATE"
-        _estimated_suns(scene, index, index["scene"]["lights"] if estimated else [])
+        _estimated_suns(scene, fitted, fitted["lights"] if estimated else [])
         if estimated:
             lamps = [obj.name for obj in scene.objects if _is_estimated(obj) and not obj.data.use_shadow]
             if lamps:
@@ -120,7 +120,7 @@ def assumed_camera(smoke: bpy.types.Object) -> bpy.types.Object | None:
     settings, scene = smoke.smokelift, scene_of(smoke)
     if settings.camera_mode != "ESTIMATE":
         return None
-    table = volume.shown_index(smoke)["scene"]["camera"]
+    table = volume.shown(smoke).scene["camera"]
     camera = settings.assumed_camera
     if camera is None or camera.type != "CAMERA" or camera.name not in scene.objects:
         camera = bpy.data.objects.new(ASSUMED_CAMERA, bpy.data.cameras.new(ASSUMED_CAMERA))
@@ -135,9 +135,9 @@ def assumed_camera(smoke: bpy.types.Object) -> bpy.types.Object | None:
     return camera
 
 
-def _scatter_as_fitted(scene: bpy.types.Scene, index: dict[str, Any]) -> None:
+def _scatter_as_fitted(scene: bpy.types.Scene, fitted: dict[str, Any]) -> None:
     """Let light bounce in smoke as often as in the model that the smoke was fitted with; by default it does once."""
-    bounces = BOUNCES if index["scene"]["medium"].get("scattering") == "multiple" else 0
+    bounces = BOUNCES if fitted["medium"].get("scattering") == "multiple" else 0
     set_unless_changed(scene, "volume_bounces", scene.cycles, "volume_bounces", bounces)
     if scene.cycles.volume_bounces == bounces:  # bounces of all kinds together end a path too
         scene.cycles.max_bounces = max(scene.cycles.max_bounces, bounces)
@@ -160,7 +160,7 @@ def has_denoiser() -> bool:
     return bool(getattr(_cycles, "with_openimagedenoise", True))
 
 
-def _estimated_suns(scene: bpy.types.Scene, index: dict[str, Any], tables: list[dict[str, Any]]) -> None:
+def _estimated_suns(scene: bpy.types.Scene, fitted: dict[str, Any], tables: list[dict[str, Any]]) -> None:
     """The suns that the engine estimated, with shadows if the smoke was fitted with them; none of earlier results."""
     names = [f"{NAME} Light", *(f"{NAME} Light {number}" for number in range(2, len(tables) + 1))][: len(tables)]
     for name, table in zip(names, tables, strict=True):
@@ -171,7 +171,7 @@ def _estimated_suns(scene: bpy.types.Scene, index: dict[str, Any], tables: list[
         strongest = max(table["irradiance"]) or 1.0
         sun.data.energy = strongest
         sun.data.color = [part / strongest for part in table["irradiance"]]
-        sun.data.use_shadow = index["scene"]["medium"].get("scattering") in ("multiple", "single")
+        sun.data.use_shadow = fitted["medium"].get("scattering") in ("multiple", "single")
         sun.rotation_euler = Vector(table["direction"]).to_track_quat("-Z", "Y").to_euler()
     for sun in [each for each in scene.objects if _is_estimated(each) and each.name not in names]:
         bpy.data.objects.remove(sun)
