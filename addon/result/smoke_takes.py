@@ -50,9 +50,8 @@ def output_folder(smoke: bpy.types.Object) -> Path:
     A new one is in that of the preferences, beside the .blend or beside the clip.
     """
     settings = smoke.smokelift
-    for folder in (settings.output, settings.results):
-        if folder:
-            return absolute(folder)
+    if folder := settings.output or settings.results:
+        return absolute(folder)
     if common := preferred("output"):  # a folder in which every smoke has one
         return absolute(common) / settings.folder
     if bpy.data.filepath:
@@ -141,8 +140,8 @@ def move_results(smoke: bpy.types.Object, folder: Path) -> None:
     The folder may be the result itself. ShotError if that is not there.
     """
     settings, name = smoke.smokelift, volume.shown_take(smoke).directory.name
-    take = next((take for take in (Take(folder / name), Take(folder)) if take.directory.name == name), None)
-    if take is None or not take.read().frames:
+    take = Take(folder if folder.name == name else folder / name)
+    if not take.read().frames:
         raise ShotError(rpt_("There is no {:s} in {:s}: choose the folder that holds it.").format(name, str(folder)))
     before = Path(settings.before).name
     volume.show(smoke, take)
@@ -152,10 +151,9 @@ def move_results(smoke: bpy.types.Object, folder: Path) -> None:
 
 def find_results_again(smoke: bpy.types.Object) -> None:
     """Have a smoke know the folder of its results where an undo took that back: the results themselves stay."""
-    settings = smoke.smokelift
     name, folder = _written_to.get(smoke.session_uid, ("", None))
-    if folder is not None and name == settings.folder and not settings.results:
-        settings.results = relative(folder)
+    if folder is not None and name == smoke.smokelift.folder and not smoke.smokelift.results:
+        smoke.smokelift.results = relative(folder)
 
 
 def _note_file(*used: Take) -> None:

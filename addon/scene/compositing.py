@@ -11,8 +11,8 @@ import bpy
 from mathutils import Matrix, Vector
 
 from .box import engine_to_world
-from .nodes import Socket, Tree, color, feed, file_group, number
-from .plate import plate_image, shown_background, synchronize_plate
+from .nodes import SINCE_5, Socket, Tree, add_node, color, feed, file_group, number, set_kind
+from .plate import shown_background, synchronize_plate
 from .smoke import scene_of
 from .volume import shown
 
@@ -41,8 +41,6 @@ _INPUTS = (
     *(number(name, "Pixels of the clip, whatever the render's size", 1.0, 1.0) for name in _CLIP_SIZE),
 )
 
-SINCE_5 = bpy.app.version >= (5, 0, 0)  # the compositor is a node group, with the shaders' Mix node
-
 
 def composite(smoke: bpy.types.Object) -> None:
     """Set the compositor up for the result on show; a second time changes the plate and the clip only."""
@@ -59,8 +57,7 @@ def composite(smoke: bpy.types.Object) -> None:
         node = _insert(tree, output)
     elif node.mute:
         _show(scene, node, True)
-    _connect_plate(tree, node, smoke)
-    _connect_clip(tree, node, smoke.smokelift.clip)
+    _connect(tree, node, smoke)
 
 
 def disable_composite(scene: bpy.types.Scene) -> None:
@@ -110,10 +107,10 @@ def _hold_out(scene: bpy.types.Scene) -> None:
     """A collection for what hides the smoke, unless the scene has one."""
     if HOLDOUTS in scene.collection.children:
         return
-    scene.collection.children.link(bpy.data.collections.new(HOLDOUTS))
-    name = scene.collection.children[-1].name
+    held = bpy.data.collections.new(HOLDOUTS)
+    scene.collection.children.link(held)
     for layer in scene.view_layers:
-        layer.layer_collection.children[name].holdout = True
+        layer.layer_collection.children[held.name].holdout = True
 
 
 def compositor(scene: bpy.types.Scene) -> tuple[Tree, Socket]:
@@ -153,24 +150,20 @@ def _insert(tree: Tree, shown: Socket) -> bpy.types.Node:
     return node
 
 
-def _connect_plate(tree: Tree, node: bpy.types.Node, smoke: bpy.types.Object) -> None:
-    """Feed the plate's socket, whose source has our name unless the artist put another there."""
-    background = shown_background(smoke)
-    source = _source(tree, "CompositorNodeImage", node, "Plate", -300.0)
-    if source is None:
-        return
-    if "image" in background:
-        source.image = plate_image(smoke)
-        synchronize_plate(smoke, source.image, source)
-    else:
-        tree.nodes.remove(source)
-        node.inputs["Plate"].default_value = (*background.get("color", (0.0, 0.0, 0.0)), 1.0)
-
-
-def _connect_clip(tree: Tree, node: bpy.types.Node, clip: bpy.types.MovieClip) -> None:
+def _connect(tree: Tree, node: bpy.types.Node, smoke: bpy.types.Object) -> None:
+    """Feed the sockets of clip and plate, whose sources have our names unless the artist put others there."""
+    clip = smoke.smokelift.clip
     for side, pixels in zip(_CLIP_SIZE, clip.size, strict=True):
         if side in node.inputs:  # the group may be an artist's own
             node.inputs[side].default_value, node.inputs[side].hide = pixels, True
+    plate, color = shown_background(smoke)
+    source = _source(tree, "CompositorNodeImage", node, "Plate", -300.0)
+    if source is not None and plate is not None:
+        source.image = plate
+        synchronize_plate(smoke, plate, source)
+    elif source is not None:
+        tree.nodes.remove(source)
+        node.inputs["Plate"].default_value = color
     source = _source(tree, "CompositorNodeMovieClip", node, "Clip", -600.0)
     if source is not None:
         source.clip = clip
@@ -224,12 +217,8 @@ def _grain(tree: Tree, source: bpy.types.bpy_prop_collection) -> Socket:
 
 def _scaled(tree: Tree, picture: Socket, kind: str) -> Socket:
     """A picture at the render's size, or at an absolute one."""
-    node = tree.nodes.new("CompositorNodeScale")
-    if "Type" in node.inputs:  # since 5.0
-        node.inputs["Type"].default_value = kind
-    else:
-        node.space = kind.upper().replace(" ", "_")
-    tree.links.new(picture, node.inputs["Image"])
+    node = add_node(tree, "CompositorNodeScale", 0, 0, picture)
+    set_kind(node, kind, "space")
     return node.outputs[0]
 
 
@@ -251,10 +240,9 @@ def _mix(tree: Tree, blend: str, factor: Any, a: Any, b: Any, clamp: bool = Fals
 
 
 def _blurred(tree: Tree, picture: Socket) -> Socket:
-    node = tree.nodes.new("CompositorNodeBlur")
+    node = add_node(tree, "CompositorNodeBlur", 0, 0, picture)
     if "Size" in node.inputs and node.inputs["Size"].type == "VECTOR":  # since 4.5
         node.inputs["Size"].default_value = [GRAIN_PIXELS] * len(node.inputs["Size"].default_value)
     else:
         node.size_x = node.size_y = GRAIN_PIXELS
-    tree.links.new(picture, node.inputs["Image"])
     return node.outputs[0]

@@ -16,7 +16,19 @@ import bpy
 
 from ..core.contract import PROXY_FILE, PROXY_VOXELS
 from ..core.take import Take
-from .nodes import Input, Socket, Tree, add_node, file_group, get_input, input_path, math_node, number, set_input
+from .nodes import (
+    SINCE_5,
+    Input,
+    Socket,
+    Tree,
+    add_node,
+    file_group,
+    get_input,
+    input_path,
+    math_node,
+    number,
+    set_input,
+)
 
 
 @dataclass(frozen=True)
@@ -105,7 +117,7 @@ def fit_proxy(smoke: bpy.types.Object, take: Take, numbers: list[int]) -> None:
         PROXY.remove(smoke)
 
 
-CAN_INTERPOLATE = bpy.app.version >= (5, 0, 0)  # whether this Blender has nodes that move grids
+CAN_INTERPOLATE = SINCE_5  # whether this Blender has nodes that move grids
 GRIDS = ("density", "flame")  # what is moved, where the files have it
 
 _INTERPOLATION_INPUTS = (

@@ -7,6 +7,7 @@ import bpy
 
 Tree, Socket = bpy.types.NodeTree, bpy.types.NodeSocket
 
+SINCE_5 = bpy.app.version >= (5, 0, 0)  # the compositor is a node group, with the shaders' Mix node
 SPACING = 200.0  # distance from one column or row of nodes to the next
 
 
@@ -99,6 +100,14 @@ def scaled_vector(tree: Tree, column: float, row: float, vector: Any, factor: So
     node = add_node(tree, "ShaderNodeVectorMath", column, row, vector, operation="SCALE")
     tree.links.new(factor, node.inputs["Scale"])
     return node.outputs["Vector"]
+
+
+def set_kind(node: bpy.types.Node, kind: str, attribute: str) -> None:
+    """Choose what kind a node of the compositor is: by its input Type, which is an attribute before 5.0."""
+    if SINCE_5:
+        node.inputs["Type"].default_value = kind
+    else:
+        setattr(node, attribute, kind.upper().replace(" ", "_"))
 
 
 def feed(tree: Tree, socket: Socket, value: Any) -> None:
