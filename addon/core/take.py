@@ -292,18 +292,14 @@ def _size_at(directory: Path, _time: int) -> float:
 
 def takes(folder: Path) -> list[Take]:
     """The takes in a folder, oldest first."""
-    return [Take(folder / f"take_{number:04d}") for number in sorted(_numbers(folder))]
+    named = (_NAME.fullmatch(path.stem) for path in (folder.iterdir() if folder.is_dir() else ()))
+    return [Take(folder / f"take_{n:04d}") for n in sorted({int(match[1]) for match in named if match})]
 
 
 def new_take(folder: Path) -> Take:
     """The take with the next free number in a folder."""
-    return Take(folder / f"take_{max(_numbers(folder), default=0) + 1:04d}")
-
-
-def _numbers(folder: Path) -> set[int]:
-    if not folder.is_dir():
-        return set()
-    return {int(match[1]) for path in folder.iterdir() if (match := _NAME.fullmatch(path.stem))}
+    number = max((int(take.directory.name.removeprefix("take_")) for take in takes(folder)), default=0) + 1
+    return Take(folder / f"take_{number:04d}")
 
 
 def toml_text(tables: Mapping[str, Any]) -> str:

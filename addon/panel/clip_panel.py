@@ -109,10 +109,6 @@ def add(context: bpy.types.Context, _smoke: bpy.types.Object | None, filepath: s
         open_tab(context.area)
 
 
-def _draw_add(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
-    menu.layout.operator(add.bl_idname, text="Smoke from Video...", icon="FILE_MOVIE")
-
-
 @operator("Use All Files", needs_clip, bl_options=UNDO)
 def use_all_files(_context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     """Use all pictures of the sequence, also those after missing ones, where it ends for Blender"""
@@ -216,7 +212,16 @@ def draw_clip(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy
     row.prop(settings, "first", text="Frames")
     row.prop(settings, "last", text="")
     row.operator("smokelift.show_clip", text="", icon="FILE_MOVIE")
-    _draw_gaps(layout, settings)
+    if (found := unseen_pictures(settings)) is not None:
+        column = layout.column(align=True)
+        if found.missing:
+            draw_text(column, "Missing: {:s}.", "ERROR", found.missing_names())
+        if settings.last < found.count:
+            icon = "BLANK1" if found.missing else "INFO"
+            draw_text(column, "Blender sees {:d} of {:d} frames.", icon, clip.frame_duration, found.count)
+            column.operator("smokelift.use_all_files")
+        else:
+            draw_text(column, "A neighboring picture stands in for each.", "BLANK1")
     if is_distorted(clip):
         text = "The clip's lens bends lines, and smoke is made for one that does not: undistort it."
         draw_hint(layout, text, "smokelift.undistort")
@@ -228,22 +233,6 @@ def draw_clip(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy
         said.append(text.format(clip.fps, frame_rate(scene)))
     if said:
         draw_hint(layout, " ".join(said), "smokelift.match_clip")
-
-
-def _draw_gaps(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
-    """Pictures that are missing in a sequence, and the button that uses those after them."""
-    found = unseen_pictures(settings)
-    if found is None:
-        return
-    column = layout.column(align=True)
-    if found.missing:
-        draw_text(column, "Missing: {:s}.", "ERROR", found.missing_names())
-    if settings.last < found.count:
-        frames, icon = (settings.clip.frame_duration, found.count), "BLANK1" if found.missing else "INFO"
-        draw_text(column, "Blender sees {:d} of {:d} frames.", icon, *frames)
-        column.operator("smokelift.use_all_files")
-    else:
-        draw_text(column, "A neighboring picture stands in for each.", "BLANK1")
 
 
 def draw_mask(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
@@ -263,6 +252,10 @@ def draw_picture(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup, 
     row = layout.row(align=True)
     row.prop(settings, name, text=" ", placeholder=placeholder)
     row.operator("smokelift.choose_picture", text="", icon="FILEBROWSER").setting = name
+
+
+def _draw_add(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
+    menu.layout.operator("smokelift.add", text="Smoke from Video...", icon="FILE_MOVIE")
 
 
 HANDLERS = ((bpy.types.VIEW3D_MT_volume_add, _draw_add),)

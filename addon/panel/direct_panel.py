@@ -127,7 +127,29 @@ def _draw_direct(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: 
     row = layout.row()
     row.use_property_split = False
     row.prop(settings, "direction", expand=True)
-    for _ in range(LINES - _DIRECTIONS[settings.direction](layout, settings)):
+    if settings.direction == "continue":
+        lines = LINES
+        draw_settings(layout, settings, "frames", "fade")
+        draw_ticked(layout, settings, "use_start", "start")
+        draw_automatic(layout, settings, "buoyancy")
+        draw_automatic(layout, settings, "dissipation")
+        layout.prop(settings, "room")
+        draw_closed(layout, settings)
+        layout.prop(settings, "effectors")
+        layout.operator("smokelift.add_effectors", icon="ADD")
+        draw_settings(layout, settings, "fan_speed", active=settings.effectors is not None)
+    elif settings.direction == "retime":
+        lines = 6 if CAN_INTERPOLATE else 5
+        draw_settings(layout, settings, "speed", "use_ramp")
+        draw_settings(layout, settings, "speed_middle", "speed_end", active=settings.use_ramp)
+        layout.prop(settings, "live")
+        if CAN_INTERPOLATE:
+            draw_settings(layout, smoke.smokelift, "between", active=settings.live)
+    else:
+        lines = 2
+        draw_ticked(layout, settings, "use_part", "part_first", "part_last")
+        draw_automatic(layout, settings, "overlap")
+    for _ in range(LINES - lines):
         layout.label(text="")
     label = settings.bl_rna.properties["direction"].enum_items[settings.direction].name
     row = layout.row()
@@ -137,35 +159,3 @@ def _draw_direct(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: 
     run = run_queue.running()
     if run is not None and run.smoke == smoke.session_uid:
         draw_progress(layout, run.job, "smokelift.cancel").take = str(run.take.directory)
-
-
-def _draw_continue(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> int:
-    """The settings of a direction; returns the number of their lines."""
-    draw_settings(layout, settings, "frames", "fade")
-    draw_ticked(layout, settings, "use_start", "start")
-    draw_automatic(layout, settings, "buoyancy")
-    draw_automatic(layout, settings, "dissipation")
-    layout.prop(settings, "room")
-    draw_closed(layout, settings)
-    layout.prop(settings, "effectors")
-    layout.operator("smokelift.add_effectors", icon="ADD")
-    draw_settings(layout, settings, "fan_speed", active=settings.effectors is not None)
-    return LINES
-
-
-def _draw_retime(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> int:
-    draw_settings(layout, settings, "speed", "use_ramp")
-    draw_settings(layout, settings, "speed_middle", "speed_end", active=settings.use_ramp)
-    layout.prop(settings, "live")
-    if CAN_INTERPOLATE:
-        draw_settings(layout, settings.id_data.smokelift, "between", active=settings.live)
-    return 6 if CAN_INTERPOLATE else 5
-
-
-def _draw_loop(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> int:
-    draw_ticked(layout, settings, "use_part", "part_first", "part_last")
-    draw_automatic(layout, settings, "overlap")
-    return 2
-
-
-_DIRECTIONS = {"continue": _draw_continue, "retime": _draw_retime, "loop": _draw_loop}

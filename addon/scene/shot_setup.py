@@ -62,8 +62,7 @@ def _set_range(scene: bpy.types.Scene, set_value: Callable[[bpy.types.ID, str, A
 
 def set_up(smoke: bpy.types.Object) -> list[str]:
     """Make renders match the clip from the camera, in the ticked parts; returns what to know of it, a sentence each."""
-    settings, scene, fitted = smoke.smokelift, scene_of(smoke), volume.shown(smoke).scene
-    said = []
+    settings, scene, said = smoke.smokelift, scene_of(smoke), []
     if settings.set_up_plate:
         _disable_other_plates(smoke)  # first: what it gives back may be set up anew
     if settings.set_up_range:
@@ -75,26 +74,7 @@ def set_up(smoke: bpy.types.Object) -> list[str]:
         else:
             show_clip_behind(smoke, scene.camera.data)
     if settings.set_up_light:
-        scene.render.engine = "CYCLES"
-        _sample_for_a_minute(scene)
-        if scene.cycles.use_denoising and not has_denoiser():  # or F12 ends in an error
-            scene.cycles.use_denoising = False
-            said.append(rpt_("Denoise is off, since this Blender has no denoiser: more Max Samples make less noise."))
-        _scatter_as_fitted(scene, fitted)
-        estimated = settings.light_mode == "ESTIMATE"
-        _estimated_suns(scene, fitted, fitted["lights"] if estimated else [])
-        if estimated:
-            lamps = [obj.name for obj in scene.objects if _is_estimated(obj) and not obj.data.use_shadow]
-            if lamps:
-                text = "The clip's light is even and casts no shadow: to light smoke from a side, give {:s} a shadow."
-                said.append(rpt_(text).format(", ".join(lamps)))
-            if hide_default_lamp(scene):
-                said.append(rpt_("The lamp of the new file is hidden: the smoke has the clip's light."))
-            lights = (obj for obj in scene.objects if obj.type == "LIGHT" and not obj.hide_render)
-            further = [obj.name for obj in lights if not _is_estimated(obj)]
-            if further:
-                text = "Beside the clip's light the smoke has that of {:s}: hide it from renders for a match."
-                said.append(rpt_(text).format(", ".join(further)))
+        said = _light(scene, volume.shown(smoke).scene, settings.light_mode == "ESTIMATE")
     if settings.set_up_plate:
         {"WORLD": _set_world, "COMPOSITE": composite, "PROJECTION": project}[settings.plate_place](smoke)
     if settings.set_up_colors:
@@ -135,20 +115,39 @@ def assumed_camera(smoke: bpy.types.Object) -> bpy.types.Object | None:
     return camera
 
 
-def _scatter_as_fitted(scene: bpy.types.Scene, fitted: dict[str, Any]) -> None:
-    """Let light bounce in smoke as often as in the model that the smoke was fitted with; by default it does once."""
+def _light(scene: bpy.types.Scene, fitted: dict[str, Any], estimated: bool) -> list[str]:
+    """Render with Cycles in the light that smoke was fitted in, added if it was estimated; returns what to know of it.
+
+    Light bounces in smoke as often as in the model that it was fitted with; by default it does once.
+    """
+    said, cycles = [], scene.cycles
+    scene.render.engine = "CYCLES"
+    if cycles.samples == NEW_SAMPLES:  # the artist did not choose how many
+        cycles.samples = SAMPLES
+        if hasattr(cycles, "volume_biased"):  # null scattering takes four times as many for the same noise
+            cycles.volume_biased = True
+    if cycles.use_denoising and not has_denoiser():  # or F12 ends in an error
+        cycles.use_denoising = False
+        said.append(rpt_("Denoise is off, since this Blender has no denoiser: more Max Samples make less noise."))
     bounces = BOUNCES if fitted["medium"].get("scattering") == "multiple" else 0
-    set_unless_changed(scene, "volume_bounces", scene.cycles, "volume_bounces", bounces)
-    if scene.cycles.volume_bounces == bounces:  # bounces of all kinds together end a path too
-        scene.cycles.max_bounces = max(scene.cycles.max_bounces, bounces)
-
-
-def _sample_for_a_minute(scene: bpy.types.Scene) -> None:
-    """Let Cycles end soon, unless the artist chose how many samples it takes."""
-    if scene.cycles.samples == NEW_SAMPLES:
-        scene.cycles.samples = SAMPLES
-        if hasattr(scene.cycles, "volume_biased"):  # null scattering takes four times as many for the same noise
-            scene.cycles.volume_biased = True
+    set_unless_changed(scene, "volume_bounces", cycles, "volume_bounces", bounces)
+    if cycles.volume_bounces == bounces:  # bounces of all kinds together end a path too
+        cycles.max_bounces = max(cycles.max_bounces, bounces)
+    _estimated_suns(scene, fitted, fitted["lights"] if estimated else [])
+    if not estimated:
+        return said
+    lamps = [obj.name for obj in scene.objects if _is_estimated(obj) and not obj.data.use_shadow]
+    if lamps:
+        text = "The clip's light is even and casts no shadow: to light smoke from a side, give {:s} a shadow."
+        said.append(rpt_(text).format(", ".join(lamps)))
+    if hide_default_lamp(scene):
+        said.append(rpt_("The lamp of the new file is hidden: the smoke has the clip's light."))
+    lights = (obj for obj in scene.objects if obj.type == "LIGHT" and not obj.hide_render)
+    further = [obj.name for obj in lights if not _is_estimated(obj)]
+    if further:
+        text = "Beside the clip's light the smoke has that of {:s}: hide it from renders for a match."
+        said.append(rpt_(text).format(", ".join(further)))
+    return said
 
 
 def has_denoiser() -> bool:
