@@ -139,10 +139,8 @@ def _insert(tree: Tree, shown: Socket) -> bpy.types.Node:
         layers = next((node for node in tree.nodes if node.type == "R_LAYERS"), None)
         layers = layers or tree.nodes.new("CompositorNodeRLayers")
         render = layers.outputs["Image"]
-    node = tree.nodes.new("CompositorNodeGroup")
-    node.node_tree = file_group(GROUP, "CompositorNodeTree", MARK, _INPUTS, {"Image": "NodeSocketColor"}, _build)
-    node.name = node.label = GROUP
-    node.width = 200.0
+    group = file_group(GROUP, "CompositorNodeTree", MARK, _INPUTS, {"Image": "NodeSocketColor"}, _build)
+    node = add_node(tree, "CompositorNodeGroup", 0, 0, node_tree=group, name=GROUP, width=200.0)
     node.location = render.node.location + Vector((render.node.width + 60.0, 0.0))
     shown.node.location = node.location + Vector((node.width + 60.0, 0.0))
     tree.links.new(render, node.inputs["Render"])
@@ -157,14 +155,14 @@ def _connect(tree: Tree, node: bpy.types.Node, smoke: bpy.types.Object) -> None:
         if side in node.inputs:  # the group may be an artist's own
             node.inputs[side].default_value, node.inputs[side].hide = pixels, True
     plate, color = shown_background(smoke)
-    source = _source(tree, "CompositorNodeImage", node, "Plate", -300.0)
+    source = _source(tree, "CompositorNodeImage", node, "Plate", 1.5)
     if source is not None and plate is not None:
         source.image = plate
         synchronize_plate(smoke, plate, source)
     elif source is not None:
         tree.nodes.remove(source)
         node.inputs["Plate"].default_value = color
-    source = _source(tree, "CompositorNodeMovieClip", node, "Clip", -600.0)
+    source = _source(tree, "CompositorNodeMovieClip", node, "Clip", 3.0)
     if source is not None:
         source.clip = clip
 
@@ -173,9 +171,7 @@ def _source(tree: Tree, kind: str, node: bpy.types.Node, socket: str, down: floa
     """Our node of pictures that feeds a socket of ours, made if need be; None where the artist put another there."""
     source = tree.nodes.get(f"{GROUP} {socket}")
     if source is None and not node.inputs[socket].links:
-        source = tree.nodes.new(kind)
-        source.name = source.label = f"{GROUP} {socket}"
-        source.location = node.location + Vector((-300.0, down))
+        source = add_node(tree, kind, -1.5, down, near=node, name=f"{GROUP} {socket}")
         tree.links.new(source.outputs["Image"], node.inputs[socket])
     return source
 

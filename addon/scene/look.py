@@ -162,12 +162,9 @@ def use_preset(smoke: bpy.types.Object, name: str, fitted_anisotropy: float) -> 
 def _new_material(name: str) -> bpy.types.Material:
     material = empty_material(name)
     tree = material.node_tree
-    output = tree.nodes.new("ShaderNodeOutputMaterial")
-    node = tree.nodes.new("ShaderNodeGroup")
-    node.node_tree = file_group(GROUP, "ShaderNodeTree", MARK, _INPUTS, {"Volume": "NodeSocketShader"}, _build)
-    node.name = node.label = NODE
-    node.width, node.location = 220.0, (-300.0, 0.0)
-    tree.links.new(node.outputs[0], output.inputs["Volume"])
+    group = file_group(GROUP, "ShaderNodeTree", MARK, _INPUTS, {"Volume": "NodeSocketShader"}, _build)
+    node = add_node(tree, "ShaderNodeGroup", -1.5, 0, node_tree=group, name=NODE, width=220.0)
+    tree.links.new(node.outputs[0], add_node(tree, "ShaderNodeOutputMaterial", 0, 0).inputs["Volume"])
     return material
 
 

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import bpy
+from mathutils import Vector
 
 Tree, Socket = bpy.types.NodeTree, bpy.types.NodeSocket
 
@@ -71,17 +72,21 @@ def file_group(
     return tree
 
 
-def add_node(tree: Tree, kind: str, column: float, row: float, *inputs: Any, **settings: Any) -> bpy.types.Node:
-    """Add a node at a place of the grid that `SPACING` makes, with these values of its attributes.
+def add_node(
+    tree: Tree, kind: str, column: float, row: float, *inputs: Any, name: str = "", near: Any = None, **settings: Any
+) -> bpy.types.Node:
+    """Add a node at a place of the grid that `SPACING` makes, near another if there is one, with these attributes.
 
     Sockets of other nodes, or values, feed its first inputs, in their order, after the attributes are set.
     """
     node = tree.nodes.new(kind)
-    node.location = (SPACING * column, -SPACING * row)
-    for name, value in settings.items():
-        setattr(node, name, value)
-    for number, value in enumerate(inputs):
-        feed(tree, node.inputs[number], value)
+    node.location = Vector((SPACING * column, -SPACING * row)) + (near.location if near else Vector((0.0, 0.0)))
+    if name:
+        node.name = node.label = name
+    for attribute, value in settings.items():
+        setattr(node, attribute, value)
+    for socket, value in zip(node.inputs, inputs):  # noqa: B905 - it may have more
+        feed(tree, socket, value)
     return node
 
 

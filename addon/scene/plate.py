@@ -11,7 +11,7 @@ from ..core import ShotError
 from . import volume
 from .blender import absolute, relative
 from .clip import frame_count, number_in_file
-from .nodes import Socket, Tree
+from .nodes import Socket, Tree, add_node
 from .strokes import saved_strokes
 
 MARK = "smokelift_plate"  # custom property of pictures that a camera's view shows behind smoke
@@ -75,12 +75,9 @@ def show_plate(smoke: bpy.types.Object, tree: Tree, shader: bpy.types.ShaderNode
         color.default_value = shown
         return
     if not color.links:
-        texture, coordinates = tree.nodes.new("ShaderNodeTexImage"), place()
-        texture.extension = "EXTEND"
-        tree.links.new(coordinates, texture.inputs["Vector"])
+        texture = add_node(tree, "ShaderNodeTexImage", -1.5, 0, place(), near=shader, extension="EXTEND")
+        texture.inputs[0].links[0].from_node.location = shader.location - Vector((500.0, 0.0))
         tree.links.new(texture.outputs["Color"], color)
-        for node, left in ((texture, 300.0), (coordinates.node, 500.0)):
-            node.location = shader.location - Vector((left, 0.0))
     node = color.links[0].from_node
     node.image = image
     synchronize_plate(smoke, image, node.image_user)

@@ -17,6 +17,7 @@ from .smoke import scene_of
 from .volume import frames_before, shown, shown_take
 
 MATERIAL = "Smokelift Projection"  # name of the material, and of the node group in it
+PLACE = "Smokelift Projection Place"  # name of the group's node in the material
 MARK = "smokelift_projection"  # custom property by which material and group are known under any name
 PROJECTOR = "Smokelift Projector"  # name of the camera that stands where the clip was filmed from
 CARD = "Smokelift Card"  # name of the plane that the plate is projected on
@@ -38,7 +39,7 @@ def project(smoke: bpy.types.Object) -> None:
     scene.render.film_transparent = False
     projector = _projector(smoke, tables["camera"])
     material = _material(projector, tables["camera"])
-    placed = material.node_tree.nodes[f"{MATERIAL} Place"].outputs[0]
+    placed = material.node_tree.nodes[PLACE].outputs[0]
     show_plate(smoke, material.node_tree, material.node_tree.nodes[MATERIAL], lambda: placed)
     if CARD not in scene.objects:
         _add_card(smoke, tables, material)
@@ -121,7 +122,7 @@ def _material(projector: bpy.types.Object, table: dict[str, Any]) -> bpy.types.M
     material = material or _new_material()
     nodes = material.node_tree.nodes
     nodes[PROJECTOR].object = projector
-    place, (width, height) = nodes[f"{MATERIAL} Place"], table["size"]
+    place, (width, height) = nodes[PLACE], table["size"]
     place.inputs["Focal Length"].default_value = (table["fx"] / width, table["fy"] / height, 0.0)
     # Blender counts the rows of a picture from below
     place.inputs["Center"].default_value = (table["cx"] / width, 1.0 - table["cy"] / height, 0.0)
@@ -134,21 +135,17 @@ def _new_material() -> bpy.types.Material:
     material = empty_material(MATERIAL)
     material[MARK] = True
     tree = material.node_tree
-    output, mix = add_node(tree, "ShaderNodeOutputMaterial", 5, 0), add_node(tree, "ShaderNodeMixShader", 4, 0)
-    rays, clear = add_node(tree, "ShaderNodeLightPath", 3, -2), add_node(tree, "ShaderNodeBsdfTransparent", 3, -1)
-    shader = add_node(tree, "ShaderNodeEmission", 3, 1, name=MATERIAL, label=MATERIAL)
     outputs = {"Vector": "NodeSocketVector", "In Front": "NodeSocketFloat"}
     group = file_group(MATERIAL, "ShaderNodeTree", MARK, _INPUTS, outputs, _build)
-    name = f"{MATERIAL} Place"
-    place = add_node(tree, "ShaderNodeGroup", 1, 1, node_tree=group, name=name, label=name)
-    place.width = 180.0
-    projector = add_node(tree, "ShaderNodeTexCoord", 0, 1, name=PROJECTOR, label=PROJECTOR)
-    tree.links.new(projector.outputs["Object"], place.inputs["Point"])
+    point = add_node(tree, "ShaderNodeTexCoord", 0, 1, name=PROJECTOR).outputs["Object"]
+    place = add_node(tree, "ShaderNodeGroup", 1, 1, node_tree=group, name=PLACE, width=180.0)
+    tree.links.new(point, place.inputs["Point"])
+    shader = add_node(tree, "ShaderNodeEmission", 3, 1, name=MATERIAL)
     tree.links.new(place.outputs["In Front"], shader.inputs["Strength"])
-    tree.links.new(rays.outputs["Is Camera Ray"], mix.inputs[0])
-    tree.links.new(clear.outputs[0], mix.inputs[1])
-    tree.links.new(shader.outputs[0], mix.inputs[2])
-    tree.links.new(mix.outputs[0], output.inputs["Surface"])
+    rays = add_node(tree, "ShaderNodeLightPath", 3, -2).outputs["Is Camera Ray"]
+    clear = add_node(tree, "ShaderNodeBsdfTransparent", 3, -1).outputs[0]
+    mix = add_node(tree, "ShaderNodeMixShader", 4, 0, rays, clear, shader.outputs[0])
+    add_node(tree, "ShaderNodeOutputMaterial", 5, 0, mix.outputs[0])
     material.cycles.emission_sampling = "NONE"
     return material
 

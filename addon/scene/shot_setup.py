@@ -15,6 +15,7 @@ from . import volume
 from .blender import set_and_remember, set_unless_changed
 from .clip import used_range
 from .compositing import composite, disable_composite
+from .nodes import add_node
 from .plate import show_clip_behind, show_plate, show_plate_behind
 from .projection import project, show_card
 from .smoke import ASSUMED_CAMERA, hide_default_lamp, scene_of, smokes
@@ -199,22 +200,16 @@ def _set_world(smoke: bpy.types.Object) -> None:
         scene.world = world
     if world.node_tree is None:  # since 5.0 there always is one
         world.use_nodes = True
-    nodes, links = world.node_tree.nodes, world.node_tree.links
-    output = next((node for node in nodes if node.type == "OUTPUT_WORLD" and node.is_active_output), None)
-    output = output or nodes.new("ShaderNodeOutputWorld")
-    mix = nodes.get(NAME)
+    tree = world.node_tree
+    output = next((node for node in tree.nodes if node.type == "OUTPUT_WORLD" and node.is_active_output), None)
+    output = output or tree.nodes.new("ShaderNodeOutputWorld")
+    mix = tree.nodes.get(NAME)
     if mix is None:
-        mix = nodes.new("ShaderNodeMixShader")
-        mix.name = mix.label = NAME
-        mix.location = output.location - Vector((0.0, 200.0))
+        rays = add_node(tree, "ShaderNodeLightPath", -2, 2, near=output).outputs["Is Camera Ray"]
+        mix = add_node(tree, "ShaderNodeMixShader", 0, 1, rays, near=output, name=NAME)
         if output.inputs["Surface"].links:
-            links.new(output.inputs["Surface"].links[0].from_socket, mix.inputs[1])
-        links.new(mix.outputs[0], output.inputs["Surface"])
-        rays = nodes.new("ShaderNodeLightPath")
-        links.new(rays.outputs["Is Camera Ray"], mix.inputs[0])
-        background = nodes.new("ShaderNodeBackground")
-        links.new(background.outputs[0], mix.inputs[2])
-        for node, left in ((rays, 400.0), (background, 200.0)):
-            node.location = mix.location - Vector((left, 200.0))
-    tree, background = world.node_tree, mix.inputs[2].links[0].from_node
+            tree.links.new(output.inputs["Surface"].links[0].from_socket, mix.inputs[1])
+        tree.links.new(add_node(tree, "ShaderNodeBackground", -1, 2, near=output).outputs[0], mix.inputs[2])
+        tree.links.new(mix.outputs[0], output.inputs["Surface"])
+    background = mix.inputs[2].links[0].from_node
     show_plate(smoke, tree, background, lambda: tree.nodes.new("ShaderNodeTexCoord").outputs["Window"])
