@@ -75,15 +75,14 @@ def _draw_export(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: 
     layout.operator("smokelift.add_instance", icon="DUPLICATE")
 
 
-def _is_driven(obj: bpy.types.Object) -> bool:
-    return obj.data.animation_data is not None and len(obj.data.animation_data.drivers) > 0
-
-
 _needs_sequence = Need(
     "Select a Volume that plays a sequence",
     lambda context, _: context.object and context.object.type == "VOLUME" and context.object.data.is_sequence,
 )
-_needs_no_driver = Need("Set Speed to Frame by Frame first", lambda context, _: not _is_driven(context.object))
+_needs_no_driver = Need(
+    "Set Speed to Frame by Frame first",
+    lambda context, _: not (context.object.data.animation_data and context.object.data.animation_data.drivers),
+)
 IN_TIME = {
     "offset": whole("Time Offset", default=12)("Frames by which the new object plays later; below 0 earlier"),
     "repeat": tick("Repeat")("Play the frames again and again, as for a loop"),

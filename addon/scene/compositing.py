@@ -50,7 +50,11 @@ def composite(smoke: bpy.types.Object) -> None:
         scene.render.engine = "CYCLES"  # EEVEE has no shadow catcher
     scene.render.film_transparent = True
     _catch_shadow(scene, smoke, shown(smoke).scene["domain"])
-    _hold_out(scene)
+    if HOLDOUTS not in scene.collection.children:
+        held = bpy.data.collections.new(HOLDOUTS)
+        scene.collection.children.link(held)
+        for layer in scene.view_layers:
+            layer.layer_collection.children[held.name].holdout = True
     tree, output = compositor(scene)
     node = tree.nodes.get(GROUP)
     if node is None:
@@ -101,16 +105,6 @@ def _catch_shadow(scene: bpy.types.Scene, smoke: bpy.types.Object, domain: dict[
     plane.visible_volume_scatter = plane.visible_diffuse = plane.visible_shadow = False
     plane.display_type = "WIRE"
     scene.collection.objects.link(plane)
-
-
-def _hold_out(scene: bpy.types.Scene) -> None:
-    """A collection for what hides the smoke, unless the scene has one."""
-    if HOLDOUTS in scene.collection.children:
-        return
-    held = bpy.data.collections.new(HOLDOUTS)
-    scene.collection.children.link(held)
-    for layer in scene.view_layers:
-        layer.layer_collection.children[held.name].holdout = True
 
 
 def compositor(scene: bpy.types.Scene) -> tuple[Tree, Socket]:
