@@ -50,15 +50,11 @@ class SetUpSettings:
     )
 
 
-DESCRIPTION = (
-    "Make a Cycles render from the camera match the clip: resolution, frame rate, background, estimated light "
-    "and colors, with samples for about a minute in a new file. The old world stays in the file"
-)
-
-
-@operator("Set Up Shot", needs_clip, needs_result, bl_options=UNDO, bl_description=DESCRIPTION)
+@operator("Set Up Shot", needs_clip, needs_result, bl_options=UNDO)
 def set_up(context: bpy.types.Context, smoke: bpy.types.Object) -> str:
-    """Make a render from the camera match the clip."""
+    """Make a Cycles render from the camera match the clip: resolution, frame rate, background, estimated light
+    and colors, with samples for about a minute in a new file. The old world stays in the file
+    """
     take, settings = volume.shown_take(smoke), smoke.smokelift
     if volume.shown(smoke) is None:
         text = rpt_("The files of the smoke in {:s} are missing: make it again.")
