@@ -33,12 +33,12 @@ _CLIP_SIZE = ("Clip Width", "Clip Height")
 LARGEST_DIFFERENCE = 0.05  # of clip and plate, blurred (linear): beyond it is smoke, whose detail is no grain
 
 _INPUTS = (
-    color("Render", "The smoke on transparent film", (0.0, 0.0, 0.0, 0.0)),
-    color("Plate", "What is behind the smoke: the clean plate, or another clip", (0.0, 0.0, 0.0, 1.0)),
-    color("Clip", "The clip, from which the grain and the foreground are taken", (0.0, 0.0, 0.0, 1.0)),
-    number("Foreground", "Mask of what is in front of the smoke in the clip", 0.0, 0.0, 1.0),
-    number("Grain", "Strength of the clip's grain on plate and smoke; 0 is none", 1.0, 0.0, 10.0),
-    *(number(name, "Pixels of the clip, whatever the render's size", 1.0, 1.0) for name in _CLIP_SIZE),
+    color("Render", 0.0, 0.0, 0.0, 0.0)("The smoke on transparent film"),
+    color("Plate", 0.0, 0.0, 0.0, 1.0)("What is behind the smoke: the clean plate, or another clip"),
+    color("Clip", 0.0, 0.0, 0.0, 1.0)("The clip, from which the grain and the foreground are taken"),
+    number("Foreground", 0.0, 0.0, 1.0)("Mask of what is in front of the smoke in the clip"),
+    number("Grain", 1.0, 0.0, 10.0)("Strength of the clip's grain on plate and smoke; 0 is none"),
+    *(number(name, 1.0, 1.0)("Pixels of the clip, whatever the render's size") for name in _CLIP_SIZE),
 )
 
 

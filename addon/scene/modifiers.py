@@ -123,8 +123,8 @@ GRIDS = ("density", "flame")  # what is moved, where the files have it
 _INTERPOLATION_INPUTS = (
     Input("Smoke", "NodeSocketGeometry", "The frame before"),
     Input("Next Frame", "NodeSocketObject", "Volume that plays the same files a frame earlier"),
-    number("Part", "How far it is from the frame before, 0, to the frame after, 1", 0.0, 0.0, 1.0),
-    number("Seconds", "From the frame before to the frame after", 1.0, 0.0),
+    number("Part", 0.0, 0.0, 1.0)("How far it is from the frame before, 0, to the frame after, 1"),
+    number("Seconds", 1.0, 0.0)("From the frame before to the frame after"),
 )
 
 

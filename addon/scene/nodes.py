@@ -23,16 +23,17 @@ class Input(NamedTuple):
     high: float | None = None
 
 
-def number(
-    name: str, description: str, default: float = 0.0, low: float | None = None, high: float | None = None
-) -> Input:
+Described = Callable[[str], Input]  # makes an input of its tooltip
+
+
+def number(name: str, default: float = 0.0, low: float | None = None, high: float | None = None) -> Described:
     """An input that is a number."""
-    return Input(name, "NodeSocketFloat", description, default, low, high)
+    return lambda description: Input(name, "NodeSocketFloat", description, default, low, high)
 
 
-def color(name: str, description: str, default: tuple[float, float, float, float]) -> Input:
+def color(name: str, *default: float) -> Described:
     """An input that is a color with alpha."""
-    return Input(name, "NodeSocketColor", description, default)
+    return lambda description: Input(name, "NodeSocketColor", description, default)
 
 
 def empty_material(name: str) -> bpy.types.Material:

@@ -26,7 +26,7 @@ _INPUTS = (
     Input("Point", "NodeSocketVector", "A point in the space of the camera that filmed"),
     Input("Focal Length", "NodeSocketVector", "Focal length over the width and over the height of the picture"),
     Input("Center", "NodeSocketVector", "Center of the lens in the picture, from 0 to 1"),
-    number("Perspective", "1 for a perspective camera, 0 for an orthographic one"),
+    number("Perspective")("1 for a perspective camera, 0 for an orthographic one"),
 )
 
 CARD_BEHIND = 1.1  # distance of the card from the projector over that of the box's farthest corner
