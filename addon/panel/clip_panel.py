@@ -11,8 +11,8 @@ from ..core import ShotError
 from ..result import smoke_takes
 from ..result.shot_check import state
 from ..scene import shot_setup
-from ..scene.blender import absolute, frame_rate, relative
-from ..scene.clip import clip_path, frame_count, shown_frame, unseen_pictures, used_range
+from ..scene.blender import absolute, file_of, frame_rate, relative
+from ..scene.clip import frame_count, shown_frame, unseen_pictures, used_range
 from ..scene.pictures import is_distorted, undistorted
 from ..scene.smoke import active_smoke, free_folder, new_smoke
 from . import editors
@@ -163,7 +163,7 @@ def plate_from_frame(_context: bpy.types.Context, smoke: bpy.types.Object) -> No
 def _ask_beside_clip(this: bpy.types.Operator, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
     settings = active_smoke(context.scene).smokelift
     chosen = getattr(settings, this.setting)
-    this.filepath = str(absolute(chosen)) if chosen else f"{clip_path(settings.clip).parent}{os.sep}"
+    this.filepath = str(absolute(chosen)) if chosen else f"{file_of(settings.clip).parent}{os.sep}"
     return ChoosesFile.invoke(this, context, event)
 
 
@@ -206,8 +206,8 @@ def show_clip(_context: bpy.types.Context, smoke: bpy.types.Object) -> None:
 def draw_clip(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     scene, settings = context.scene, smoke.smokelift
     clip = settings.clip
-    if not clip_path(clip).is_file():
-        draw_text(layout, "{:s} is not there: choose the clip again.", "ERROR", str(clip_path(clip)))
+    if not file_of(clip).is_file():
+        draw_text(layout, "{:s} is not there: choose the clip again.", "ERROR", str(file_of(clip)))
     row = layout.row(align=True)
     row.prop(settings, "first", text="Frames")
     row.prop(settings, "last", text="")

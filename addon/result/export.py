@@ -17,7 +17,7 @@ from ..core.contract import ASSET_FILE, EXPORT_FILE, FRAME_FILE
 from ..core.job import Job
 from ..core.sentences import disk_size
 from ..scene import volume
-from ..scene.blender import absolute, call_later, relative
+from ..scene.blender import absolute, call_later, file_of, relative
 from ..scene.look import fit_look
 from ..scene.smoke import find_smoke
 from . import smoke_takes
@@ -97,7 +97,7 @@ def copy_of(obj: bpy.types.Object, offset: int = 0, repeat: bool = False) -> bpy
     copy.delta_location = obj.delta_location  # first: the matrix has it, and gives the rest to the location
     copy.matrix_basis = obj.matrix_basis
     if obj.data.library is not None:
-        copy.data.filepath = relative(absolute(obj.data.filepath, obj.data.library))
+        copy.data.filepath = relative(file_of(obj.data))
     copy.data.frame_start += offset
     if repeat:
         copy.data.sequence_mode = "REPEAT"

@@ -14,10 +14,9 @@ from ..core import ShotError
 from ..core.job import Job
 from ..core.take import Take, new_take, takes
 from ..scene import shot_setup, volume
-from ..scene.blender import absolute, preferred, relative
-from ..scene.clip import clip_path
+from ..scene.blender import absolute, file_of, preferred, relative
 from ..scene.scene_file import options as engine_options
-from ..scene.scene_file import shot_tables
+from ..scene.scene_file import shot_files, shot_tables
 from ..scene.smoke import active_smoke, hide_default_cube, is_smoke, scene_of, separate_duplicate, smokes
 from . import directing
 
@@ -56,7 +55,7 @@ def output_folder(smoke: bpy.types.Object) -> Path:
         return absolute(common) / settings.folder
     if bpy.data.filepath:
         return Path(bpy.data.filepath).parent / "smokelift" / settings.folder
-    return clip_path(settings.clip).parent / f"{settings.folder}_smokelift"
+    return file_of(settings.clip).parent / f"{settings.folder}_smokelift"
 
 
 def own_takes(smoke: bpy.types.Object) -> list[Take]:
@@ -165,16 +164,8 @@ def _note_file(*used: Take) -> None:
 
 def update_moved_files(smoke: bpy.types.Object, take: Take) -> None:
     """Write today's paths into a resumed take's scene file, if the project was moved; ShotError if it is damaged."""
-    settings = smoke.smokelift
     if take.read().direction is None:
-        files = {("clip", "path"): clip_path(settings.clip)}
-        if settings.mask:
-            files["clip", "mask"] = absolute(settings.mask)
-        if settings.plate:
-            files["background", "image"] = absolute(settings.plate)
-        if settings.strokes is not None:
-            files["background", "strokes"] = absolute(settings.strokes.filepath, settings.strokes.library)
-        take.update_moved_files(files)
+        take.update_moved_files(shot_files(smoke))
 
 
 def unfinished(smoke: bpy.types.Object) -> Take | None:

@@ -21,6 +21,11 @@ PATH_OPTIONS = {"ANIMATABLE"} | ({"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.ver
 TOLERANCE = 1e-5  # difference, relative to the value above 1, that rounding in Blender's 32-bit numbers may make
 
 
+def file_of(data: bpy.types.ID) -> Path:
+    """The absolute path of the file of a clip, an image or a Volume."""
+    return absolute(data.filepath, data.library)
+
+
 def absolute(path: str, library: bpy.types.Library | None = None, folder: Path | None = None) -> Path:
     """The absolute path, without the ``..`` that Blender's relative paths begin with: so it can be compared.
 

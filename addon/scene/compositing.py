@@ -175,7 +175,7 @@ def _build(tree: Tree) -> None:
     given, output = tree.nodes.new("NodeGroupInput"), tree.nodes.new("NodeGroupOutput")
     source = given.outputs
     over = tree.nodes.new("CompositorNodeAlphaOver")
-    below, above = (over.inputs[0], over.inputs[1]) if SINCE_5 else (over.inputs[1], over.inputs[2])
+    below, above = over.inputs[:2] if SINCE_5 else over.inputs[1:3]
     tree.links.new(_scaled(tree, source["Plate"], "Render Size"), below)
     tree.links.new(source["Render"], above)
     grain = _scaled(tree, _grain(tree, source), "Render Size")

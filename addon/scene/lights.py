@@ -8,7 +8,7 @@ from mathutils import Matrix, Vector
 
 from ..core import ShotError
 from ..core.contract import PANORAMA_SUFFIXES
-from .blender import absolute
+from .blender import file_of
 from .box import is_inside
 
 
@@ -66,7 +66,7 @@ def _world_tables(scene: bpy.types.Scene, rotation: Matrix) -> list[dict[str, An
         strength = node.inputs["Strength"].default_value
         if source is None or source.type != "TEX_ENVIRONMENT" or source.image is None or strength == 0.0:
             continue
-        path = absolute(source.image.filepath, source.image.library)
+        path = file_of(source.image)
         if source.projection != "EQUIRECTANGULAR" or path.suffix.lower() not in PANORAMA_SUFFIXES:
             raise ShotError(
                 f"The world's picture {source.image.name} cannot be used: it has to be an .exr or .hdr panorama."

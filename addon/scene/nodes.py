@@ -86,8 +86,8 @@ def add_node(
         node.name = node.label = name
     for attribute, value in settings.items():
         setattr(node, attribute, value)
-    for socket, value in zip(node.inputs, inputs):  # noqa: B905 - it may have more
-        feed(tree, socket, value)
+    for place, value in enumerate(inputs):
+        feed(tree, node.inputs[place], value)
     return node
 
 

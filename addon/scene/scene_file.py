@@ -13,7 +13,7 @@ from mathutils import Matrix
 
 from ..core import ShotError
 from ..core.contract import IMAGE_SUFFIXES, SIDES
-from .blender import at_frame
+from .blender import absolute, at_frame, file_of
 from .box import box_corners, box_of, domain_table, has_inlet, in_scene, inlet_table, keep_camera_outside
 from .camera import camera_over_frames
 from .clip import clip_table, start_frame
@@ -31,6 +31,16 @@ def footage_tables(smoke: bpy.types.Object, quick: bool = False) -> dict[str, An
         tables["clip"]["mask"] = str(mask)
     background = background_table(smoke)
     return {**tables, "background": background} if background else tables
+
+
+def shot_files(smoke: bpy.types.Object) -> dict[tuple[str, str], Path]:
+    """The files that are chosen for a shot, by the table of its scene file that names them, and their key there."""
+    settings = smoke.smokelift
+    chosen = {("clip", "mask"): settings.mask, ("background", "image"): settings.plate}
+    files = {key: absolute(path) for key, path in chosen.items() if path}
+    if settings.strokes is not None:
+        files["background", "strokes"] = file_of(settings.strokes)
+    return {("clip", "path"): file_of(settings.clip), **files}
 
 
 def shot_tables(smoke: bpy.types.Object, quick: bool = False) -> dict[str, Any]:

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..core import ShotError
-from .blender import absolute, relative
+from .blender import absolute, file_of, relative
 
 SATURATION = 0.25  # fraction of the frame's saturation that is kept below the strokes
 MIN_STROKE = 0.5  # smallest alpha of a stroke, and smallest difference of its channels: twice that of the frame below
@@ -22,7 +22,7 @@ Pixels = npt.NDArray[np.float32]  # red, green, blue and alpha of an image, (pix
 
 def saved_strokes(image: bpy.types.Image, clip: bpy.types.MovieClip) -> Path:
     """The file of the strokes on a clip, with what was painted last; ShotError if it is missing or of another size."""
-    file = absolute(image.filepath, image.library)
+    file = file_of(image)
     try:
         if WRITTEN in image:
             if image.is_dirty or image[WRITTEN] != _time(file):

@@ -11,7 +11,7 @@ from mathutils import Vector
 from ..core.contract import DIRECTIONS, FRAME_FILE, MADE_UP, PROXY_FILE
 from ..core.retiming import retiming
 from ..core.take import TITLES, Snapshot, Take
-from .blender import absolute, frame_rate, relative, set_unless_changed
+from .blender import absolute, file_of, frame_rate, relative, set_unless_changed
 from .box import engine_to_world
 from .look import fit_look
 from .modifiers import FRAMES_BETWEEN, PROXY, drive_interpolation, fit_interpolation, fit_proxy
@@ -47,7 +47,7 @@ def show(smoke: bpy.types.Object, take: Take) -> bpy.types.Object | None:
     return smoke
 
 
-def show_beside(smoke: bpy.types.Object, take: Take) -> None:
+def show_beside(smoke: bpy.types.Object, take: Take) -> bpy.types.Object:
     """Show a take with finished frames in a copy of a smoke, on its right, which is no smoke itself."""
     now = take.read()
     copy = smoke.copy()
@@ -61,11 +61,12 @@ def show_beside(smoke: bpy.types.Object, take: Take) -> None:
     width = (domain["max"][0] - domain["min"][0]) * BESIDE
     copy.location += copy.matrix_basis.to_3x3() @ Vector((width, 0.0, 0.0))
     _play(copy, take)
+    return copy
 
 
 def take_of(volume: bpy.types.Volume) -> Take | None:
     """The take that a Volume plays; None for one without a file, whose empty path saving turns into ``//``."""
-    path = absolute(volume.filepath, volume.library)
+    path = file_of(volume)
     return Take(path.parent) if path.suffix == ".vdb" else None
 
 
