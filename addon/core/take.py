@@ -238,7 +238,8 @@ def _file_state(file: Path) -> FileState:
 def _snapshot_at(take: Take, request_state: FileState, _index_state: FileState, scene_state: FileState) -> Snapshot:
     """The snapshot of a take whose files are in these states."""
     request, index = _json(take.request_file), _json(take.directory / INDEX_FILE)
-    if "complete" not in index or not isinstance(index.get("frames"), dict):
+    frames = index.get("frames")
+    if "complete" not in index or not isinstance(frames, dict) or not all(number.isdecimal() for number in frames):
         index = {}
     direction, there, options = (request.get(key) for key in ("direction", "source", "options"))
     if not isinstance(direction, str) or direction not in DIRECTIONS:

@@ -148,14 +148,14 @@ def _connect(tree: Tree, node: bpy.types.Node, smoke: bpy.types.Object) -> None:
     for side, pixels in zip(_CLIP_SIZE, clip.size, strict=True):
         if side in node.inputs:  # the group may be an artist's own
             node.inputs[side].default_value, node.inputs[side].hide = pixels, True
-    plate, color = shown_background(smoke)
+    plate, one_color = shown_background(smoke)
     source = _source(tree, "CompositorNodeImage", node, "Plate", 1.5)
     if source is not None and plate is not None:
         source.image = plate
         synchronize_plate(smoke, plate, source)
     elif source is not None:
         tree.nodes.remove(source)
-        node.inputs["Plate"].default_value = color
+        node.inputs["Plate"].default_value = one_color
     source = _source(tree, "CompositorNodeMovieClip", node, "Clip", 3.0)
     if source is not None:
         source.clip = clip
