@@ -70,10 +70,9 @@ def require_fitting_zip() -> None:
     The ShotError names the zip that fits.
     """
     pythons = sorted(folder.name.removeprefix("python") for folder in HOME.glob("python3.*"))
-    try:
+    manifest = {}
+    with suppress(OSError, ValueError):  # it runs without being installed
         manifest = tomllib.loads((HOME / "blender_manifest.toml").read_text(encoding="utf-8"))
-    except (OSError, ValueError):  # it runs without being installed
-        manifest = {}
     own_python = LIBRARIES.removeprefix("python")
     # what this Blender is compiled for: Windows on Arm also runs programs for x64, and tells them its own
     compiled = sysconfig.get_platform().rpartition("-")[2] if sys.platform == "win32" else platform.machine().lower()
@@ -206,17 +205,15 @@ class Job:
                     before = [each for each in self.doubts if kind not in REPLACED.get(each[0], ())]
                     self.doubts = [*before, (kind, words)]
                 self._write_log(self.notes[-1])
-            case "start":
+            case "start" | "frame":
                 self.done, self.total = int(message["done"]), int(message["total"])
                 if "qualities" in message:
                     self.forecast = message, self.doubts
                 if "seconds_left" in message:
                     self.seconds_left = float(message["seconds_left"])
-            case "frame":
-                self.done, self.total = int(message["done"]), int(message["total"])
-                self.seconds_left = float(message["seconds_left"])
-                number = self._before + int(message["frame"])
-                self._write_log(f"frame {number}: {self.done} of {self.total}")
+                if event == "frame":
+                    number = self._before + int(message["frame"])
+                    self._write_log(f"frame {number}: {self.done} of {self.total}")
             case "done":
                 self.sentence = sentence(message, self._before, [kind for kind, _ in self.doubts])
                 self.details = message
@@ -247,11 +244,9 @@ class Job:
                 f"The engine was ended from outside (signal {abs(status) % 128}), perhaps for lack of memory: choose a "
                 "lower quality."
             )
-        try:
-            lines = self._log_path.read_bytes()[-4096:].decode("utf-8", "replace").split("\n")
-        except OSError:
-            lines = []
-        last = next((line.strip() for line in reversed(lines) if line.strip()), "")
+        last = ""
+        with suppress(OSError):
+            last = self._log_path.read_bytes()[-4096:].decode("utf-8", "replace").strip().rpartition("\n")[2].strip()
         return f"The engine stopped with an error of its own: {last or f'status {status}'}"
 
     def _write_log(self, text: str) -> None:

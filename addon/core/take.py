@@ -41,42 +41,35 @@ _NUMBER = re.compile(r"-?\d+(\.\d+)?(:\d+)?")  # a number or a range of frames; 
 _NAME = re.compile(r"take_(\d{4,})")
 
 
+class _FileBeside:
+    """The file beside a take's directory with a suffix."""
+
+    def __init__(self, suffix: str) -> None:
+        self._suffix = suffix
+
+    def __get__(self, take: "Take", _owner: type) -> Path:
+        return take.directory.with_suffix(self._suffix)
+
+
 @dataclass(frozen=True)
 class Take:
     """One run's files; ``directory`` holds its sequence."""
 
     directory: Path
 
-    @property
-    def scene_file(self) -> Path:
-        """The scene file."""
-        return self.directory.with_suffix(".toml")
-
-    @property
-    def request_file(self) -> Path:
-        """The engine's further options."""
-        return self.directory.with_suffix(".json")
-
-    @property
-    def log_file(self) -> Path:
-        """The engine's messages."""
-        return self.directory.with_suffix(".log")
-
-    @property
-    def thumbnail_file(self) -> Path:
-        """The thumbnail of the last frame."""
-        return self.directory.with_suffix(".png")
+    scene_file = _FileBeside(".toml")  # the scene file
+    request_file = _FileBeside(".json")  # the engine's further options
+    log_file = _FileBeside(".log")  # the engine's messages
+    thumbnail_file = _FileBeside(".png")  # the thumbnail of the last frame
 
     def copy_mask(self, drawn: Path) -> str:
         """Copy the mask that was drawn for it, so that another does not change it; returns what its scene file has.
 
-        It is a picture ``mask.png``, or the pattern ``mask_####.png`` of numbered ones. ShotError if the folder
-        cannot be written to.
+        It is a picture ``mask.png``, or the pattern ``mask_####.png`` of numbered ones. ShotError if that fails.
         """
-        beside = self.directory.name
-        files = sorted(drawn.parent.glob(drawn.name.replace("####", "*")))
-        self._write({self.directory.with_name(f"{beside}_{file.name}"): file.read_bytes() for file in files})
-        return f"{beside}_{drawn.name}"
+        files = drawn.parent.glob(drawn.name.replace("####", "*"))
+        self._write({Path(f"{self.directory}_{file.name}"): file.read_bytes() for file in files})
+        return f"{self.directory.name}_{drawn.name}"
 
     def write(self, tables: Mapping[str, Any], options: Sequence[str]) -> None:
         """Write the scene file from its tables, and the engine's further options; ShotError if that fails."""
@@ -87,12 +80,10 @@ class Take:
     ) -> None:
         """Write what is made of another take, by a direction of `DIRECTIONS`.
 
-        The options are the engine's, with those of its values that are numbers. Meshes are obstacles, as a
-        binary STL file, one for each frame if they move. ShotError if the folder cannot be written to.
+        Meshes are obstacles, as a binary STL file, one for each frame if they move. ShotError if that fails.
         """
         request = _request(options, direction=direction, source=_relative_path(self.directory.parent, source.directory))
-        name = self.directory.name
-        files = {self.directory.with_name(f"{name}_{n:04d}.stl"): content for n, content in enumerate(meshes)}
+        files = {Path(f"{self.directory}_{n:04d}.stl"): content for n, content in enumerate(meshes)}
         self._write({**files, self.request_file: request})
 
     def _write(self, files: Mapping[Path, bytes]) -> None:
@@ -113,20 +104,18 @@ class Take:
     def update_moved_files(self, files: Mapping[tuple[str, str], Path]) -> None:
         """Write today's paths into its scene file for files that are not where they were: the project was moved.
 
-        Today's path is given by the table that it is in, and its key there. ShotError if the scene file is
-        damaged or cannot be written.
+        Each is given by the table that it is in, and its key there. ShotError if that fails.
         """
         try:
             tables = tomllib.loads(self.scene_file.read_text(encoding="utf-8"))
-            moved = False
-            for (table, key), path in files.items():
-                before = tables.get(table, {}).get(key)
-                if isinstance(before, str) and not self._has(before) and path.is_file():
-                    tables[table][key] = str(path)
-                    moved = True
+            named = {(table, key): tables.get(table, {}).get(key) for table, key in files}
         except (OSError, ValueError, AttributeError) as error:
             raise ShotError(f"{self.scene_file} is missing or damaged: make the smoke again.") from error
-        if moved:
+        moved = [at for at, path in named.items() if isinstance(path, str) and not self._has(path)]
+        found = {at: str(files[at]) for at in moved if files[at].is_file()}
+        for (table, key), path in found.items():
+            tables[table][key] = path
+        if found:
             self._write({self.scene_file: toml_text(tables).encode()})
 
     def _has(self, path: str) -> bool:
@@ -203,19 +192,30 @@ class Snapshot:
     source: Take | None  # the other take; None likewise
     options: list[str] | None  # the engine's further options; None where the request is missing or damaged
     title: str  # the name that the artist gave it, or its number
-    index: dict[str, Any] | None  # `sequence.json`, not to be changed; None before there is one, or of a foreign one
+    index: dict[str, Any]  # `sequence.json`, not to be changed; empty before there is one, or of a foreign one
+    numbers: list[int]  # those of the finished frames
     begun: bool  # whether it has what a run needs
     files: frozenset[Path] | None  # .blend files, without links, that may show it; None where a list was never kept
 
     @property
     def frames(self) -> int:
         """Number of finished frames."""
-        return len(self.index["frames"]) if self.index else 0
+        return len(self.numbers)
+
+    @property
+    def file_numbers(self) -> list[int]:
+        """The numbers in the names of their files; the engine of earlier versions counts from 1."""
+        return [number + self.index.get("start_number", 1) - 1 for number in self.numbers]
+
+    @property
+    def scene(self) -> Any:
+        """The tables of its scene as the engine completed them, where there is an index."""
+        return self.index["scene"]
 
     @property
     def complete(self) -> bool:
         """Whether all frames are finished."""
-        return bool(self.index and self.index["complete"])
+        return bool(self.index.get("complete"))
 
     @property
     def resumable(self) -> bool:
@@ -238,6 +238,9 @@ def _file_state(file: Path) -> FileState:
 def _snapshot_at(take: Take, request_state: FileState, _index_state: FileState, scene_state: FileState) -> Snapshot:
     """The snapshot of a take whose files are in these states."""
     request, index = _json(take.request_file), _json(take.directory / INDEX_FILE)
+    frames = index.get("frames")
+    if "complete" not in index or not isinstance(frames, dict) or not all(number.isdecimal() for number in frames):
+        index = {}
     direction, there, options = (request.get(key) for key in ("direction", "source", "options"))
     if not isinstance(direction, str) or direction not in DIRECTIONS:
         direction = None
@@ -252,7 +255,8 @@ def _snapshot_at(take: Take, request_state: FileState, _index_state: FileState, 
         source=source,
         options=None if options is None else [str(word) for word in options],
         title=str(request.get("title", "")) or f"{TITLES.get(direction or '', 'Take')} {number}",
-        index=index if "complete" in index and isinstance(index.get("frames"), dict) else None,
+        index=index,
+        numbers=sorted(map(int, index["frames"])) if index else [],
         begun=request_state is not None and (direction is not None or scene_state is not None),
         files=frozenset((folder / str(file)).resolve() for file in files) if isinstance(files, list) else None,
     )
@@ -289,18 +293,14 @@ def _size_at(directory: Path, _time: int) -> float:
 
 def takes(folder: Path) -> list[Take]:
     """The takes in a folder, oldest first."""
-    return [Take(folder / f"take_{number:04d}") for number in sorted(_numbers(folder))]
+    named = (_NAME.fullmatch(path.stem) for path in (folder.iterdir() if folder.is_dir() else ()))
+    return [Take(folder / f"take_{n:04d}") for n in sorted({int(match[1]) for match in named if match})]
 
 
 def new_take(folder: Path) -> Take:
     """The take with the next free number in a folder."""
-    return Take(folder / f"take_{max(_numbers(folder), default=0) + 1:04d}")
-
-
-def _numbers(folder: Path) -> set[int]:
-    if not folder.is_dir():
-        return set()
-    return {int(match[1]) for path in folder.iterdir() if (match := _NAME.fullmatch(path.stem))}
+    number = max((int(take.directory.name.removeprefix("take_")) for take in takes(folder)), default=0) + 1
+    return Take(folder / f"take_{number:04d}")
 
 
 def toml_text(tables: Mapping[str, Any]) -> str:

@@ -12,18 +12,14 @@ from .settings import choice, tick
 class PlaybackSettings:
     """How a result is played."""
 
-    speed: choice(
-        "Speed",
+    speed: choice("Speed", update=speed_changed)(
         "Speed of the smoke if clip and scene differ in frame rate",
         ("FRAMES", "Frame by Frame", "One frame of the clip in each frame of the scene, as Blender plays clips"),
         ("REAL", "Real Time", "As fast as in reality"),
-        update=speed_changed,
     )
-    between: tick(
-        "Frames Between",
+    between: tick("Frames Between", update=speed_changed)(
         "At another speed than the clip's, compute what lies between two frames with their velocity, while it is "
-        "shown and rendered. Blender can do so since 5.0",
-        update=speed_changed,
+        "shown and rendered. Blender can do so since 5.0"
     )
 
 

@@ -35,8 +35,7 @@ def _middle_of_box(settings: bpy.types.PropertyGroup) -> float:
 class ShotSettings:
     """Where the clip was filmed from, the box of its smoke, and what lights it."""
 
-    camera_mode: choice(
-        "Camera",
+    camera_mode: choice("Camera")(
         "Where the clip was filmed from",
         (
             "ESTIMATE",
@@ -45,53 +44,33 @@ class ShotSettings:
         ),
         ("SCENE", "Scene Camera", "The scene's camera with its lens, sensor and shift, tracked or still"),
     )
-    box: link(
-        "Box",
-        "Box that holds all of the smoke. A smaller box gives a finer result",
-        bpy.types.Object,
-        poll=lambda _settings, obj: obj.type == "MESH",
-        update=_box_chosen,
+    box: link("Box", bpy.types.Object, poll=lambda _settings, obj: obj.type == "MESH", update=_box_chosen)(
+        "Box that holds all of the smoke. A smaller box gives a finer result"
     )
-    inlet: link(
-        "Inlet",
-        "Empty at the smoke's source, as large as the opening. Without one, sources are estimated",
-        bpy.types.Object,
-        poll=lambda _settings, obj: obj.type == "EMPTY",
+    inlet: link("Inlet", bpy.types.Object, poll=lambda _settings, obj: obj.type == "EMPTY")(
+        "Empty at the smoke's source, as large as the opening. Without one, sources are estimated"
     )
-    distance: number(
-        "Distance",
+    distance: number("Distance", subtype="DISTANCE", min=0.0)(
         "Distance from the camera to the lower end of the smoke, level and straight ahead; automatic is estimated. "
-        "With Camera From the Clip it sets the scale",
-        subtype="DISTANCE",
-        min=0.0,
+        "With Camera From the Clip it sets the scale"
     )
     use_distance: automatic_unless("distance", "Distance", _middle_of_box)
     closed: closed_sides(
         "Sides of the box, along its own axes, that are solid: no air flows through them. -Z is a floor"
     )
-    light_mode: choice(
-        "Light",
+    light_mode: choice("Light")(
         "What lights the smoke in the clip",
         ("ESTIMATE", "From the Clip", "Estimate even light from the smoke's brightness"),
         ("SCENE", "Scene Lights", "The scene's suns and point lights, and its world's panorama"),
     )
-    use_medium: tick("Smoke Material", "Set the smoke's optical properties")
-    extinction: number(
-        "Extinction",
-        "Extinction coefficient per meter of smoke of density 1",
-        default=5.0,
-        min=0.001,
-        max=1e9,
-        soft_max=50.0,
+    use_medium: tick("Smoke Material")("Set the smoke's optical properties")
+    extinction: number("Extinction", default=5.0, min=0.001, max=1e9, soft_max=50.0)(
+        "Extinction coefficient per meter of smoke of density 1"
     )
-    albedo: number(
-        "Albedo",
-        "Scattered fraction of the extinction: 1 is white steam, 0 is black soot",
-        default=0.9,
-        min=0.0,
-        max=1.0,
+    albedo: number("Albedo", default=0.9, min=0.0, max=1.0)(
+        "Scattered fraction of the extinction: 1 is white steam, 0 is black soot"
     )
-    anisotropy: number("Anisotropy", "Forward scattering above 0, backward scattering below", min=-0.95, max=0.95)
+    anisotropy: number("Anisotropy", min=-0.95, max=0.95)("Forward scattering above 0, backward scattering below")
 
 
 _needs_camera = Need(

@@ -11,8 +11,8 @@ from ..core import ShotError
 from ..result import smoke_takes
 from ..result.shot_check import state
 from ..scene import shot_setup
-from ..scene.blender import absolute, frame_rate, relative
-from ..scene.clip import clip_path, frame_count, shown_frame, unseen_pictures, used_range
+from ..scene.blender import absolute, file_of, frame_rate, relative
+from ..scene.clip import frame_count, shown_frame, unseen_pictures, used_range
 from ..scene.pictures import is_distorted, undistorted
 from ..scene.smoke import active_smoke, free_folder, new_smoke
 from . import editors
@@ -44,63 +44,45 @@ def _background_chosen(settings: bpy.types.PropertyGroup, _context: bpy.types.Co
 class ClipSettings:
     """The clip, what is behind its smoke, and where its smoke may be."""
 
-    clip: link("Clip", "Footage of smoke: a video or an image sequence", bpy.types.MovieClip, update=_clip_chosen)
-    first: whole(
-        "First",
-        "First frame of the clip to use, counted from 1 as Blender does; the command line counts from 0",
-        default=1,
-        min=1,
+    clip: link("Clip", bpy.types.MovieClip, update=_clip_chosen)("Footage of smoke: a video or an image sequence")
+    first: whole("First", default=1, min=1)(
+        "First frame of the clip to use, counted from 1 as Blender does; the command line counts from 0"
     )
-    last: whole(
-        "Last",
-        "Last frame of the clip to use, counted from 1 as Blender does; the command line counts from 0",
-        default=1,
-        min=1,
+    last: whole("Last", default=1, min=1)(
+        "Last frame of the clip to use, counted from 1 as Blender does; the command line counts from 0"
     )
-    plate_mode: choice(
-        "Background",
+    plate_mode: choice("Background", update=_background_chosen)(
         "The picture without smoke",
         ("ESTIMATE", "From the Clip", "Estimate the background from frames where no smoke covers it"),
         ("FILE", "Clean Plate", "Picture of the same view without smoke; for a moving camera, one for each frame"),
         ("FRAMES", "Frames", "Frames of the clip in which there is no smoke"),
         ("COLOR", "Color", "One color, as behind stock footage on black; at first the one that the clip shows"),
-        update=_background_chosen,
     )
-    plate_color: vector(
-        "Background Color", "Color of all that is behind the smoke", subtype="COLOR", min=0.0, soft_max=1.0
+    plate_color: vector("Background Color", subtype="COLOR", min=0.0, soft_max=1.0)(
+        "Color of all that is behind the smoke"
     )
-    plate: string(
-        "Clean Plate",
+    plate: string("Clean Plate")(
         "Picture of the same view without smoke. For a moving camera: a video, or the first image of a sequence, with "
-        "one image for each frame of the clip",
+        "one image for each frame of the clip"
     )
-    plate_frames: string("Frames", "Frames of the clip without smoke, counted from 1 and separated by commas")
-    strokes: link(
-        "Strokes",
+    plate_frames: string("Frames")("Frames of the clip without smoke, counted from 1 and separated by commas")
+    strokes: link("Strokes", bpy.types.Image)(
         "Image of the clip's size: painted green where smoke is, red where none is, blue where a pixel shows the "
-        "background. Nothing is said of the rest, which is transparent",
-        bpy.types.Image,
+        "background. Nothing is said of the rest, which is transparent"
     )
-    drawn_mask: link(
-        "Mask",
+    drawn_mask: link("Mask", bpy.types.Mask)(
         "Mask of the Clip Editor: smoke may be inside its lines, or outside those of a layer that is inverted, and "
-        "nowhere else, whatever moves there",
-        bpy.types.Mask,
+        "nowhere else, whatever moves there"
     )
-    mask: string(
-        "Mask File",
+    mask: string("Mask File")(
         "Picture that is white where smoke may be and black where none is, whatever moves there; or a video, or "
-        "mask_####.png, with one for each frame of the clip",
+        "mask_####.png, with one for each frame of the clip"
     )
-    fps: number(
-        "Frame Rate",
-        "Frame rate at which the clip was filmed, if it plays in slow motion; automatic is the clip's own",
-        min=0.0,
-        soft_max=1000.0,
+    fps: number("Frame Rate", min=0.0, soft_max=1000.0)(
+        "Frame rate at which the clip was filmed, if it plays in slow motion; automatic is the clip's own"
     )
     use_fps: automatic_unless("fps", "Frame Rate", 120.0)
-    transfer: choice(
-        "Color Space",
+    transfer: choice("Color Space")(
         "Color space of the clip",
         ("AUTO", "From the Clip", "As the clip's settings in the Movie Clip Editor say"),
         ("srgb", "sRGB", "Ordinary video and pictures"),
@@ -125,10 +107,6 @@ def add(context: bpy.types.Context, _smoke: bpy.types.Object | None, filepath: s
     new_smoke(context.scene, clip)
     if not bpy.app.background and context.area is not None and context.area.type == "VIEW_3D":
         open_tab(context.area)
-
-
-def _draw_add(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
-    menu.layout.operator(add.bl_idname, text="Smoke from Video...", icon="FILE_MOVIE")
 
 
 @operator("Use All Files", needs_clip, bl_options=UNDO)
@@ -185,7 +163,7 @@ def plate_from_frame(_context: bpy.types.Context, smoke: bpy.types.Object) -> No
 def _ask_beside_clip(this: bpy.types.Operator, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
     settings = active_smoke(context.scene).smokelift
     chosen = getattr(settings, this.setting)
-    this.filepath = str(absolute(chosen)) if chosen else f"{clip_path(settings.clip).parent}{os.sep}"
+    this.filepath = str(absolute(chosen)) if chosen else f"{file_of(settings.clip).parent}{os.sep}"
     return ChoosesFile.invoke(this, context, event)
 
 
@@ -228,13 +206,22 @@ def show_clip(_context: bpy.types.Context, smoke: bpy.types.Object) -> None:
 def draw_clip(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     scene, settings = context.scene, smoke.smokelift
     clip = settings.clip
-    if not clip_path(clip).is_file():
-        draw_text(layout, "{:s} is not there: choose the clip again.", "ERROR", str(clip_path(clip)))
+    if not file_of(clip).is_file():
+        draw_text(layout, "{:s} is not there: choose the clip again.", "ERROR", str(file_of(clip)))
     row = layout.row(align=True)
     row.prop(settings, "first", text="Frames")
     row.prop(settings, "last", text="")
     row.operator("smokelift.show_clip", text="", icon="FILE_MOVIE")
-    _draw_gaps(layout, settings)
+    if (found := unseen_pictures(settings)) is not None:
+        column = layout.column(align=True)
+        if found.missing:
+            draw_text(column, "Missing: {:s}.", "ERROR", found.missing_names())
+        if settings.last < found.count:
+            icon = "BLANK1" if found.missing else "INFO"
+            draw_text(column, "Blender sees {:d} of {:d} frames.", icon, clip.frame_duration, found.count)
+            column.operator("smokelift.use_all_files")
+        else:
+            draw_text(column, "A neighboring picture stands in for each.", "BLANK1")
     if is_distorted(clip):
         text = "The clip's lens bends lines, and smoke is made for one that does not: undistort it."
         draw_hint(layout, text, "smokelift.undistort")
@@ -246,22 +233,6 @@ def draw_clip(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy
         said.append(text.format(clip.fps, frame_rate(scene)))
     if said:
         draw_hint(layout, " ".join(said), "smokelift.match_clip")
-
-
-def _draw_gaps(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
-    """Pictures that are missing in a sequence, and the button that uses those after them."""
-    found = unseen_pictures(settings)
-    if found is None:
-        return
-    column = layout.column(align=True)
-    if found.missing:
-        draw_text(column, "Missing: {:s}.", "ERROR", found.missing_names())
-    if settings.last < found.count:
-        frames, icon = (settings.clip.frame_duration, found.count), "BLANK1" if found.missing else "INFO"
-        draw_text(column, "Blender sees {:d} of {:d} frames.", icon, *frames)
-        column.operator("smokelift.use_all_files")
-    else:
-        draw_text(column, "A neighboring picture stands in for each.", "BLANK1")
 
 
 def draw_mask(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
@@ -281,6 +252,10 @@ def draw_picture(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup, 
     row = layout.row(align=True)
     row.prop(settings, name, text=" ", placeholder=placeholder)
     row.operator("smokelift.choose_picture", text="", icon="FILEBROWSER").setting = name
+
+
+def _draw_add(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
+    menu.layout.operator("smokelift.add", text="Smoke from Video...", icon="FILE_MOVIE")
 
 
 HANDLERS = ((bpy.types.VIEW3D_MT_volume_add, _draw_add),)

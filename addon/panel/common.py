@@ -57,7 +57,7 @@ class Needing:
 def operator(
     label: str, *needs: Need, base: type = Needing, given: Mapping[str, Any] | None = None, **attributes: Any
 ) -> Callable[[Act], type]:
-    """Make an operator of what it does: the class SMOKELIFT_OT_NAME, with the function's name and docstring.
+    """Make an operator of what it does: the class SMOKELIFT_OT_NAME, whose tooltip is the function's docstring.
 
     Its button says the label, and it can be used where nothing is missing that it needs. It has the base and
     further attributes. What it is ``given``, Blender's properties, the function gets by their names.
@@ -75,7 +75,8 @@ def operator(
                 this.report({"INFO"}, said)
             return {"FINISHED"}
 
-        own = {"__module__": act.__module__, "__doc__": act.__doc__, "__annotations__": given or {}, **attributes}
+        tooltip = " ".join((act.__doc__ or "").split())
+        own = {"__module__": act.__module__, "__doc__": tooltip, "__annotations__": given or {}, **attributes}
         own |= {"bl_label": label, "needs": needs, "execute": execute}
         return type(f"SMOKELIFT_OT_{act.__name__}", (base, bpy.types.Operator), own)
 

@@ -79,9 +79,9 @@ def _windows_and_areas() -> list[tuple[bpy.types.Window, bpy.types.Area]]:
 def _fit(area_pointer: int) -> None:
     """Show the whole of a picture or clip in an editor; a timer, as a window has no size before it is drawn."""
     for window, area in _windows_and_areas():
-        if area.as_pointer() == area_pointer and area.type in ("IMAGE_EDITOR", "CLIP_EDITOR"):
+        view = {"IMAGE_EDITOR": bpy.ops.image, "CLIP_EDITOR": bpy.ops.clip}.get(area.type)
+        if area.as_pointer() == area_pointer and view is not None:
             region = next(region for region in area.regions if region.type == "WINDOW")
-            view = bpy.ops.image if area.type == "IMAGE_EDITOR" else bpy.ops.clip
             with bpy.context.temp_override(window=window, area=area, region=region):
                 view.view_all(fit_view=True)
 

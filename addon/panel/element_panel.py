@@ -13,12 +13,11 @@ from ..core import ShotError
 from ..core.take import Take
 from ..result import smoke_takes
 from ..result.side_job import write_files
-from ..scene.blender import relative
 from ..scene.clip import number_in_file, shown_frame
 from ..scene.pictures import write_pictures
 from ..scene.scene_file import footage_tables
 from ..scene.smoke import active_smoke
-from ..scene.strokes import lay_below, new_strokes, saved_strokes
+from ..scene.strokes import lay_below, saved_strokes, strokes_at
 from .common import FOLDER, UNDO, OpensBrowser, needs_clip, needs_rest, operator, panels
 from .editors import show_image
 from .layout import draw_text, draw_work
@@ -36,7 +35,7 @@ def paint_strokes(context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     try:
         shown_frame(smoke)
         if settings.strokes is None:
-            settings.strokes = _strokes(smoke)
+            settings.strokes = strokes_at(smoke_takes.output_folder(smoke) / STROKES_FILE, settings.clip.size)
         saved_strokes(settings.strokes, settings.clip)
         picture = write_pictures(settings.clip, now, now, Path(bpy.app.tempdir) / "smokelift_frame_")
         lay_below(settings.strokes, picture)
@@ -46,19 +45,7 @@ def paint_strokes(context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     _choose_color(context, "SMOKE")
 
 
-def _strokes(smoke: bpy.types.Object) -> bpy.types.Image:
-    """The strokes beside the smoke's results, or new ones there."""
-    file = smoke_takes.output_folder(smoke) / STROKES_FILE
-    if file.is_file():
-        image = bpy.data.images.load(str(file), check_existing=True)
-    else:
-        image = new_strokes(file, smoke.smokelift.clip.size)
-    image.filepath = relative(file)
-    return image
-
-
-MEANS = choice(
-    "Means",
+MEANS = choice("Means")(
     "What is painted",
     ("SMOKE", "Smoke", "There is smoke here", "COLORSET_03_VEC", 0),
     ("NOT_SMOKE", "Not Smoke", "There is no smoke here, whatever moves", "COLORSET_01_VEC", 1),

@@ -15,28 +15,22 @@ from .settings import choice, string, tick, whole
 class ExportSettings:
     """What is exported of a smoke."""
 
-    folder: string(
-        "Folder",
-        "Folder for the export; by default export_ and the program's name, beside the results",
-        subtype="DIR_PATH",
-        options=PATH_OPTIONS,
+    folder: string("Folder", subtype="DIR_PATH", options=PATH_OPTIONS)(
+        "Folder for the export; by default export_ and the program's name, beside the results"
     )
-    host: choice(
-        "For",
+    host: choice("For")(
         "Program that reads the files",
         ("blender", "Blender", "And other programs with Z up: grids density and velocity"),
         ("houdini", "Houdini", "Y up, grids density and vel"),
         ("unreal", "Unreal", "Densities from 0 to 1 for 8 bits, and a pivot that stays in place"),
     )
-    precision: choice(
-        "Precision",
+    precision: choice("Precision")(
         "Bits of each value. Smoke too thin to be seen is left out either way",
         ("half", "Half", "Floats of 16 bits"),
         ("quantized", "Quantized", "As few bits as a picture of 8 bits needs: half the size"),
     )
-    use_velocity: tick("Velocity", "Export the velocity, which motion blur needs", default=True)
-    proxy: choice(
-        "Proxy",
+    use_velocity: tick("Velocity", default=True)("Export the velocity, which motion blur needs")
+    proxy: choice("Proxy")(
         "Second, coarser sequence for the viewports of those who get the export",
         ("1", "None", "No proxy"),
         ("2", "1/2", "Half the resolution, an eighth of the voxels"),
@@ -81,18 +75,17 @@ def _draw_export(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: 
     layout.operator("smokelift.add_instance", icon="DUPLICATE")
 
 
-def _is_driven(obj: bpy.types.Object) -> bool:
-    return obj.data.animation_data is not None and len(obj.data.animation_data.drivers) > 0
-
-
 _needs_sequence = Need(
     "Select a Volume that plays a sequence",
     lambda context, _: context.object and context.object.type == "VOLUME" and context.object.data.is_sequence,
 )
-_needs_no_driver = Need("Set Speed to Frame by Frame first", lambda context, _: not _is_driven(context.object))
+_needs_no_driver = Need(
+    "Set Speed to Frame by Frame first",
+    lambda context, _: not (context.object.data.animation_data and context.object.data.animation_data.drivers),
+)
 IN_TIME = {
-    "offset": whole("Time Offset", "Frames by which the new object plays later; below 0 earlier", default=12),
-    "repeat": tick("Repeat", "Play the frames again and again, as for a loop"),
+    "offset": whole("Time Offset", default=12)("Frames by which the new object plays later; below 0 earlier"),
+    "repeat": tick("Repeat")("Play the frames again and again, as for a loop"),
 }
 
 

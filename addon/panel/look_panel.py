@@ -21,14 +21,14 @@ _needs_look = Need(
 PRESETS = [(key, name, description) for key, (name, description, _) in look.PRESETS.items()]
 
 
-@operator("Use Look", _needs_look, bl_options=UNDO, given={"preset": choice("Preset", "Kind of smoke", *PRESETS)})
+@operator("Use Look", _needs_look, bl_options=UNDO, given={"preset": choice("Preset")("Kind of smoke", *PRESETS)})
 def use_look(context: bpy.types.Context, _smoke: bpy.types.Object, preset: str) -> None:
     """Set density, brightness, colors and edges of the smoke. What was fitted to the clip stays"""
     smoke = smoke_with_look(context.scene)
-    index = volume.shown_take(smoke).read().index
-    if index is None:
+    now = volume.shown_take(smoke).read()
+    if not now.index:
         raise ShotError("The smoke's files are missing: make it again.")
-    if not look.use_preset(smoke, preset, index["scene"]["medium"]["anisotropy"]):
+    if not look.use_preset(smoke, preset, now.scene["medium"]["anisotropy"]):
         raise ShotError("The smoke's material is your own: remove it and show the result again for presets.")
 
 
@@ -55,21 +55,17 @@ def _draw_look(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bp
     modifier = PROXY.modifier(smoke)
     if not override:
         column.prop(in_viewport(smoke).display, "density", text="View Density")
-        _draw_render(column, context, smoke)
+        # Cycles goes through smoke by null scattering since 5.0, unless it is set to march as before
+        cycles = getattr(context.scene, "cycles", None)
+        may_choose = hasattr(cycles, "volume_biased")
+        if may_choose:
+            column.prop(cycles, "volume_biased", text="March in Cycles")
+        row = column.row()
+        row.active = not may_choose or cycles.volume_biased
+        row.prop(smoke.data.render, "step_size", text="Render Step")
+        if may_choose and not cycles.volume_biased:
+            draw_text(column, "Marching has less noise per sample, but its steps make an error.", "INFO")
     if modifier is not None:
         column.prop(modifier, "show_viewport", text="Proxy in View", icon="NONE")
     elif not override:
         draw_work(column, smoke, "smokelift.make_proxy", "MOD_REMESH")
-
-
-def _draw_render(column: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
-    """How Cycles goes through smoke: since 5.0 by null scattering, unless it is set to march as before."""
-    cycles = getattr(context.scene, "cycles", None)
-    may_choose = hasattr(cycles, "volume_biased")
-    if may_choose:
-        column.prop(cycles, "volume_biased", text="March in Cycles")
-    row = column.row()
-    row.active = not may_choose or cycles.volume_biased
-    row.prop(smoke.data.render, "step_size", text="Render Step")
-    if may_choose and not cycles.volume_biased:
-        draw_text(column, "Marching has less noise per sample, but its steps make an error.", "INFO")

@@ -29,20 +29,14 @@ class SmokeliftPreferences(bpy.types.AddonPreferences):
 
     bl_idname = PACKAGE
 
-    output: string(
-        "Output",
-        "Folder in which every smoke gets one for its results; by default that is beside the .blend file",
-        subtype="DIR_PATH",
+    output: string("Output", subtype="DIR_PATH")(
+        "Folder in which every smoke gets one for its results; by default that is beside the .blend file"
     )
-    quality: choice(
-        "Quality", "Quality of new smokes", *[(name, name.capitalize(), "") for name in QUALITIES], default="balanced"
+    quality: choice("Quality", default="balanced")(
+        "Quality of new smokes", *[(name, name.capitalize(), "") for name in QUALITIES]
     )
-    threads: whole(
-        "Threads",
-        "Processor threads that make smoke; automatic is all, fewer leave some for Blender",
-        min=0,
-        soft_max=64,
-        max=1024,
+    threads: whole("Threads", min=0, soft_max=64, max=1024)(
+        "Processor threads that make smoke; automatic is all, fewer leave some for Blender"
     )
     use_threads: automatic_unless("threads", "Threads", 1)
 

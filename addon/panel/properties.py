@@ -27,25 +27,18 @@ class SmokeliftSettings(
 ):
     """Settings of one smoke, on its Volume object."""
 
-    is_smoke: tick("Smoke", "The object is made from a clip", options={"HIDDEN"})
-    folder: string("Folder", "Name of the folder for the results", options={"HIDDEN"})
-    results: string(
-        "Results",
-        "Folder that holds the results where none is chosen; the add-on keeps it in step with the .blend",
-        options={"HIDDEN"},
+    is_smoke: tick("Smoke", options={"HIDDEN"})("The object is made from a clip")
+    folder: string("Folder", options={"HIDDEN"})("Name of the folder for the results")
+    results: string("Results", options={"HIDDEN"})(
+        "Folder that holds the results where none is chosen; the add-on keeps it in step with the .blend"
     )
-    saved_as: string(
-        "Saved As",
-        "The .blend as it was last saved or opened, which may have been copied or renamed meanwhile",
-        options={"HIDDEN"},
+    saved_as: string("Saved As", options={"HIDDEN"})(
+        "The .blend as it was last saved or opened, which may have been copied or renamed meanwhile"
     )
-    before: string("Before", "The result that was shown before", options={"HIDDEN"})
-    directing: link("Direct", "What is made of the result", SmokeliftDirecting)
-    output: string(
-        "Output",
-        "Folder for the results; by default beside the .blend file, or beside the clip if that is unsaved",
-        subtype="DIR_PATH",
-        options=PATH_OPTIONS,
+    before: string("Before", options={"HIDDEN"})("The result that was shown before")
+    directing: link("Direct", SmokeliftDirecting)("What is made of the result")
+    output: string("Output", subtype="DIR_PATH", options=PATH_OPTIONS)(
+        "Folder for the results; by default beside the .blend file, or beside the clip if that is unsaved"
     )
 
 

@@ -17,40 +17,26 @@ CELLS = 0.245, 0.215, 0.18, 0.18  # fractions of a line: button, time, memory, d
 class QualitySettings:
     """How fine the smoke is made, and on what."""
 
-    quality: choice(
-        "Quality",
+    quality: choice("Quality", default="balanced")(
         "More detail takes more time, memory (RAM, in GiB) and disk space. Lost is the fraction of the contrast of the "
         "clip's smoke that is finer than the voxels",
         ("draft", "Draft", "A quick preview"),
         ("balanced", "Balanced", "Good for most shots"),
         ("fine", "Fine", "More of the clip's detail, several times slower"),
         ("final", "Final", "All of the clip's detail, one voxel per pixel: much memory, seconds to minutes per frame"),
-        default="balanced",
     )
-    detail: number(
-        "Depth Detail",
+    detail: number("Depth Detail", subtype="FACTOR", default=1.0, min=0.0, max=1.0)(
         "How much fine structure in depth is made up in the clip's texture, since no camera shows it. At 0 the smoke "
-        "is smooth from the side, which is best for measuring; at 1 it is as detailed as in the clip",
-        subtype="FACTOR",
-        default=1.0,
-        min=0.0,
-        max=1.0,
+        "is smooth from the side, which is best for measuring; at 1 it is as detailed as in the clip"
     )
-    seed: whole(
-        "Variation",
-        "Number of the plausible smoke: all look alike from the camera, and differ from the side",
-        min=0,
-        max=SEEDS - 1,
+    seed: whole("Variation", min=0, max=SEEDS - 1)(
+        "Number of the plausible smoke: all look alike from the camera, and differ from the side"
     )
-    longest_side: whole(
-        "Resolution",
-        "Voxels along the box's longest side; automatic is by the detail that is measured in the clip",
-        min=0,
-        max=1024,
+    longest_side: whole("Resolution", min=0, max=1024)(
+        "Voxels along the box's longest side; automatic is by the detail that is measured in the clip"
     )
     use_longest_side: automatic_unless("longest_side", "Resolution", BOX_VOXELS)
-    device: choice(
-        "Device",
+    device: choice("Device")(
         "Device that renders",
         ("auto", "Automatic", "The CPU, until a GPU is measured to be faster"),
         ("cpu", "CPU", "The CPU only"),

@@ -87,17 +87,11 @@ def _confirm_earlier(this: bpy.types.Operator, context: bpy.types.Context, event
     return _confirm(this, context, event, removable)
 
 
-DESCRIPTION = (
-    "Delete the files of the results before the one on show. What a Volume of this file shows, what another result "
-    "was made of and what other files may show stays"
-)
-
-
-@operator(
-    "Delete Earlier Results?", needs_clip, given={"asked": HIDDEN}, invoke=_confirm_earlier, bl_description=DESCRIPTION
-)
+@operator("Delete Earlier Results?", needs_clip, given={"asked": HIDDEN}, invoke=_confirm_earlier)
 def remove_takes(context: bpy.types.Context, _smoke: bpy.types.Object, asked: str) -> None:
-    """Delete results that nothing needs."""
+    """Delete the files of the results before the one on show. What a Volume of this file shows, what another result
+    was made of and what other files may show stays
+    """
     for take in earlier_takes(context):
         if not asked or str(take.directory) in asked.split("\n"):
             take.remove()

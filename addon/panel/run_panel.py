@@ -1,12 +1,9 @@
 """Runs in the tab: the buttons that make smoke and stop that, and the queue."""
 
-from typing import Any
-
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
 from ..core import ShotError
-from ..core.take import Take
 from ..result import run_queue, smoke_takes
 from ..result.shot_check import settings_text
 from ..result.smoke_takes import Run, runs
@@ -56,58 +53,44 @@ def resume(_context: bpy.types.Context, smoke: bpy.types.Object) -> None:
 def draw_run(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     """The buttons, whose places do not change; below them the warnings, the runs, and what is known of the result."""
     own = [run for run in runs if run.smoke == smoke.session_uid]
-    idle, index = all(run.job.ended for run in own), volume.shown_index(smoke)
+    idle, now = all(run.job.ended for run in own), volume.shown(smoke)
     begun = smoke_takes.unfinished(smoke) if idle else None
     text = "Start Again" if begun is not None and begun.read().frames else "Make Smoke"
     column = layout.column()
     column.scale_y = 1.5
     column.operator("smokelift.run", text=text if idle else "Make Another After This", icon="PLAY")
     column = layout.column()
-    column.enabled = index is not None
+    column.enabled = now is not None
     column.operator("smokelift.set_up", icon="CAMERA_DATA")
     row = column.row()
-    row.enabled = index is not None and index["complete"]
+    row.enabled = now is not None and now.complete
     row.operator("smokelift.vary", icon="MOD_NOISE")
     jobs = [run.job for run in own]
-    of_runs = {job.sentence for job in jobs} | {kind for job in jobs for kind, _ in job.doubts}
-    draw_check(layout, smoke, of_runs)
+    draw_check(layout, smoke, {job.sentence for job in jobs} | {kind for job in jobs for kind, _ in job.doubts})
     said: set[str] = set()
     for run in runs:
         _draw_run(layout, smoke, run, said)
     if begun is not None:
-        _draw_begun(layout, smoke, begun, any(run.take == begun for run in own))
-    if index is not None:
-        _draw_shown(layout, context, smoke, index)
+        frames, title = begun.read().frames, begun.read().title
+        if all(run.take != begun for run in own):  # the end of another session interrupted it
+            text = "{:s} was interrupted." if frames else "{:s} was interrupted before its first frame."
+            draw_text(layout, text, "ERROR", title)
+        if frames:
+            text = iface_("Resume {:s} after Frame {:d}").format(title, volume.frames_before(smoke, begun) + frames)
+            layout.operator("smokelift.resume", text=text, translate=False, icon="FILE_REFRESH")
+    if now is not None:
+        first, last = volume.shown_range(smoke)
+        if smoke.data.sequence_mode == "CLIP" and not first <= context.scene.frame_current <= last:
+            draw_text(layout, "The smoke is seen in frames {:d} to {:d}.", "INFO", first, last)
+        if known := volume.provenance_note(smoke):
+            draw_text(layout, known, "INFO")
+        if now.complete and lacks_proxy(smoke, now.scene["domain"]):
+            text = "This smoke is large: a proxy keeps the viewport fast."
+            draw_hint(layout, text, "smokelift.make_proxy", "MOD_REMESH")
     elif (take := volume.shown_take(smoke)) is not None:
         text = "The files of the smoke in {:s} are missing: make it again, or choose their folder."
         draw_text(layout, text, "ERROR", str(take.directory))
         layout.operator("smokelift.choose_results", icon="FILE_FOLDER")
-
-
-def _draw_begun(layout: bpy.types.UILayout, smoke: bpy.types.Object, take: Take, known: bool) -> None:
-    """A run that can go on; one that this session does not know was interrupted by the end of another."""
-    frames = take.read().frames
-    if not known:
-        text = "{:s} was interrupted." if frames else "{:s} was interrupted before its first frame."
-        draw_text(layout, text, "ERROR", take.read().title)
-    if frames:
-        last = volume.frames_before_take(smoke, take) + frames
-        text = iface_("Resume {:s} after Frame {:d}").format(take.read().title, last)
-        layout.operator("smokelift.resume", text=text, translate=False, icon="FILE_REFRESH")
-
-
-def _draw_shown(
-    layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object, index: dict[str, Any]
-) -> None:
-    """When the result on show is seen, what of it is measured, and a proxy where it is large."""
-    seen = volume.shown_range(smoke)
-    if seen and smoke.data.sequence_mode == "CLIP" and not seen[0] <= context.scene.frame_current <= seen[1]:
-        draw_text(layout, "The smoke is seen in frames {:d} to {:d}.", "INFO", *seen)
-    if known := volume.provenance_note(smoke):
-        draw_text(layout, known, "INFO")
-    if index["complete"] and lacks_proxy(smoke, index):
-        text = "This smoke is large: a proxy keeps the viewport fast."
-        draw_hint(layout, text, "smokelift.make_proxy", "MOD_REMESH")
 
 
 def _draw_run(layout: bpy.types.UILayout, shown: bpy.types.Object, run: Run, said: set[str]) -> None:

@@ -1,4 +1,4 @@
-"""How settings are declared: Blender's properties, of which name and description come first."""
+"""How settings are declared: Blender's properties, as ``number(name, limits)(tooltip)``."""
 
 from collections.abc import Callable
 from typing import Any
@@ -7,9 +7,11 @@ from bpy import props
 
 from ..core.contract import SIDES
 
+Declared = Callable[..., Any]  # makes a property of its tooltip
 
-def _named(kind: Callable[..., Any]) -> Callable[..., Any]:
-    return lambda name, description, **options: kind(name=name, description=description, **options)
+
+def _named(kind: Callable[..., Any]) -> Callable[..., Declared]:
+    return lambda name, **options: lambda description: kind(name=name, description=description, **options)
 
 
 tick, number, whole, string, vector = map(
@@ -19,14 +21,14 @@ tick, number, whole, string, vector = map(
 """Something that is on or off, a number, a whole number, a text, and several numbers such as a color."""
 
 
-def choice(name: str, description: str, *items: tuple[Any, ...], **options: Any) -> Any:
-    """One of some items, by default the first."""
-    return props.EnumProperty(name=name, description=description, items=items, **options)
+def choice(name: str, **options: Any) -> Declared:
+    """One of some items, which follow the tooltip; by default the first."""
+    return lambda tip, *items: props.EnumProperty(name=name, description=tip, items=items, **options)
 
 
-def link(name: str, description: str, kind: type, **options: Any) -> Any:
+def link(name: str, kind: type, **options: Any) -> Declared:
     """A data-block of a kind."""
-    return props.PointerProperty(name=name, description=description, type=kind, **options)
+    return _named(props.PointerProperty)(name, type=kind, **options)
 
 
 def automatic_unless(name: str, label: str, start: float | Callable[[Any], float]) -> Any:
@@ -36,13 +38,12 @@ def automatic_unless(name: str, label: str, start: float | Callable[[Any], float
     """
     return tick(
         label,
-        f"Choose {label} by hand; otherwise it is automatic",
         get=lambda settings: getattr(settings, name) > 0,
         set=lambda settings, on: setattr(settings, name, (start(settings) if callable(start) else start) if on else 0),
-    )
+    )(f"Choose {label} by hand; otherwise it is automatic")
 
 
 def closed_sides(description: str) -> Any:
     """A row of buttons, one for each side of the box."""
     items = [(side, f"{side[1]}{side[0].upper()}", "", 1 << place) for place, side in enumerate(SIDES)]
-    return choice("Closed Sides", description, *items, options={"ANIMATABLE", "ENUM_FLAG"})
+    return choice("Closed Sides", options={"ANIMATABLE", "ENUM_FLAG"})(description, *items)

@@ -14,29 +14,22 @@ from .settings import choice, link, tick
 class SetUpSettings:
     """What Set Up Shot sets up."""
 
-    set_up_range: tick(
-        "Size, Rate and Range",
-        "Give the scene the clip's resolution and frame rate, and the length of the result",
-        default=True,
+    set_up_range: tick("Size, Rate and Range", default=True)(
+        "Give the scene the clip's resolution and frame rate, and the length of the result"
     )
-    set_up_camera: tick(
-        "Camera",
+    set_up_camera: tick("Camera", default=True)(
         "Look through the camera of the clip, with the background behind it that the render has, and the clip at a "
-        "switch",
-        default=True,
+        "switch"
     )
-    set_up_light: tick(
-        "Light",
+    set_up_light: tick("Light", default=True)(
         "Render with Cycles, scatter light in smoke as often as the engine did, and add the light that was estimated "
-        "from the clip",
-        default=True,
+        "from the clip"
     )
-    set_up_plate: tick("Background", "Show the clean plate behind the smoke", default=True)
-    set_up_colors: tick(
-        "Color Management", "Set the view transform to Standard, in which the clip looks as it was filmed", default=True
+    set_up_plate: tick("Background", default=True)("Show the clean plate behind the smoke")
+    set_up_colors: tick("Color Management", default=True)(
+        "Set the view transform to Standard, in which the clip looks as it was filmed"
     )
-    plate_place: choice(
-        "Place",
+    plate_place: choice("Place")(
         "Where the background is put behind the smoke",
         ("WORLD", "World", "In the world, seen by the camera only"),
         (
@@ -52,22 +45,18 @@ class SetUpSettings:
             "when the camera of the render moves",
         ),
     )
-    assumed_camera: link(
-        "Assumed Camera", "Camera object that stands where the clip was assumed to be filmed from", bpy.types.Object
+    assumed_camera: link("Assumed Camera", bpy.types.Object)(
+        "Camera object that stands where the clip was assumed to be filmed from"
     )
 
 
-DESCRIPTION = (
-    "Make a Cycles render from the camera match the clip: resolution, frame rate, background, estimated light "
-    "and colors, with samples for about a minute in a new file. The old world stays in the file"
-)
-
-
-@operator("Set Up Shot", needs_clip, needs_result, bl_options=UNDO, bl_description=DESCRIPTION)
+@operator("Set Up Shot", needs_clip, needs_result, bl_options=UNDO)
 def set_up(context: bpy.types.Context, smoke: bpy.types.Object) -> str:
-    """Make a render from the camera match the clip."""
+    """Make a Cycles render from the camera match the clip: resolution, frame rate, background, estimated light
+    and colors, with samples for about a minute in a new file. The old world stays in the file
+    """
     take, settings = volume.shown_take(smoke), smoke.smokelift
-    if volume.shown_index(smoke) is None:
+    if volume.shown(smoke) is None:
         text = rpt_("The files of the smoke in {:s} are missing: make it again.")
         raise ShotError(text.format(str(take.directory)))
     if settings.set_up_camera and settings.camera_mode == "SCENE" and context.scene.camera is None:

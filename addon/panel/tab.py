@@ -26,7 +26,11 @@ def show_smoke(context: bpy.types.Context, _active: bpy.types.Object, smoke: str
 
 @panels("", "Smokelift", draw_header_preset=draw_header)
 def _draw_tab(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object | None) -> None:
-    _draw_smokes(layout, context, smoke)
+    column, found = layout.column(align=True), smokes(context.scene)
+    for other in found if len(found) > 1 else ():
+        row = column.operator("smokelift.show_smoke", text=other.name, icon="VOLUME_DATA", depress=other == smoke)
+        row.smoke = other.name
+    column.operator("smokelift.add", text="Smoke from Video...", icon="ADD")
     if smoke is None:
         draw_text(layout, "Choose a video or an image sequence of smoke. If its camera moves, track it.")
         return
@@ -41,14 +45,3 @@ def _draw_tab(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy
     draw_settings(layout, settings, "seed", active=settings.detail > 0.0)
     layout.prop(settings, "output", placeholder=str(smoke_takes.output_folder(smoke)))
     draw_run(layout, context, smoke)
-
-
-def _draw_smokes(layout: bpy.types.UILayout, context: bpy.types.Context, active: bpy.types.Object | None) -> None:
-    """The smokes of the scene if there are several, and the button that adds one."""
-    column = layout.column(align=True)
-    found = smokes(context.scene)
-    if len(found) > 1:
-        for smoke in found:
-            row = column.operator("smokelift.show_smoke", text=smoke.name, icon="VOLUME_DATA", depress=smoke == active)
-            row.smoke = smoke.name
-    column.operator("smokelift.add", text="Smoke from Video...", icon="ADD")

@@ -37,13 +37,20 @@ def main(words: Sequence[str]) -> int:
     except SystemExit as leaving:
         return int(leaving.code or 0)
     try:
-        _require_means(choices)
+        if choices.save and not bpy.data.filepath:
+            raise ShotError("The file was never saved, so --save has nowhere to write: give blender a .blend to open.")
+        scene = bpy.context.scene
+        denoises = scene.cycles.use_denoising and scene.render.engine == "CYCLES"
+        if choices.render and denoises and not (choices.set_up or has_denoiser()):  # or it would fail after the run
+            raise ShotError(
+                "This Blender has no denoiser, and --render needs one: switch Denoise off in the render properties."
+            )
         smoke = _smoke(choices)
         take = smoke_takes.unfinished(smoke) if choices.resume else None
         if take is not None:
             smoke_takes.update_moved_files(smoke, take)
         take = take or smoke_takes.write_take(smoke)
-        before = volume.frames_before_take(smoke, take)
+        before = volume.frames_before(smoke, take)
         words = engine_command(take.arguments() + thread_options())
         job = Job(words, take.log_file, before, take.read().frames)
     except ShotError as error:
@@ -65,18 +72,6 @@ def main(words: Sequence[str]) -> int:
     if choices.render:
         _render(smoke, choices.render)
     return DONE
-
-
-def _require_means(choices: argparse.Namespace) -> None:
-    """Refuse before the run what would fail after it."""
-    if choices.save and not bpy.data.filepath:
-        raise ShotError("The file was never saved, so --save has nowhere to write: give blender a .blend to open.")
-    scene = bpy.context.scene
-    denoises = scene.cycles.use_denoising and scene.render.engine == "CYCLES"
-    if choices.render and denoises and not (choices.set_up or has_denoiser()):
-        raise ShotError(
-            "This Blender has no denoiser, and --render needs one: switch Denoise off in the render properties."
-        )
 
 
 def _wait(job: Job) -> None:
@@ -104,16 +99,13 @@ def _wait(job: Job) -> None:
 def _smoke(choices: argparse.Namespace) -> bpy.types.Object:
     """The smoke, with its settings overridden by the options; it is active then."""
     scene = bpy.context.scene
-    smoke = active_smoke(scene)
-    if choices.smoke:
-        smoke = next((obj for obj in smokes(scene) if obj.name == choices.smoke), None)
-        if smoke is None:
-            known = ", ".join(obj.name for obj in smokes(scene)) or "none"
-            raise ShotError(f"The scene has no smoke of the name {choices.smoke}: it has {known}.")
-    elif smoke is None:
-        if not choices.clip:
-            raise ShotError("The scene has no clip for Smokelift: give one with --clip.")
-        smoke = new_smoke(scene)
+    smoke, known = active_smoke(scene), {obj.name: obj for obj in smokes(scene)}
+    if choices.smoke and choices.smoke not in known:
+        names = ", ".join(known) or "none"
+        raise ShotError(f"The scene has no smoke of the name {choices.smoke}: it has {names}.")
+    if smoke is None and not choices.clip:
+        raise ShotError("The scene has no clip for Smokelift: give one with --clip.")
+    smoke = known.get(choices.smoke) or smoke or new_smoke(scene)
     activate(smoke, scene)
     settings = smoke.smokelift
     if choices.clip:
@@ -146,9 +138,7 @@ def _render(smoke: bpy.types.Object, path: Path) -> None:
     if "#" not in path.name:
         bpy.ops.render.render(write_still=True)
         return
-    seen = volume.shown_range(smoke)
-    if seen is not None:
-        scene.frame_start, scene.frame_end = seen
+    scene.frame_start, scene.frame_end = volume.shown_range(smoke)
     bpy.ops.render.render(animation=True)
 
 

@@ -28,66 +28,58 @@ STL_HEADER = 80  # bytes before the number of triangles
 def engine_request(smoke: bpy.types.Object) -> tuple[str, list[str], list[bytes]]:
     """What the engine is asked to do to the take that a smoke shows: its command, its options, and obstacles.
 
-    Those are a binary STL file, one for each frame if they move. ShotError if a setting or an object cannot be
-    used.
+    Those are a binary STL file, one for each frame if they move. ShotError if a setting or an object cannot be used.
     """
-    settings = smoke.smokelift.directing
-    numbers = volume.shown_numbers(smoke)
-    if len(numbers) < SHORTEST:
+    settings, now = smoke.smokelift.directing, volume.shown(smoke)
+    if now is None or now.frames < SHORTEST:
         raise ShotError(f"{SHORTEST} frames at least are needed to see how smoke moves: make the result longer first.")
     if settings.direction == "retime":
         return "retime", ["--speed", *map(_number_text, settings.speeds())], []
     if settings.direction == "loop":
         options = ["--overlap", str(settings.overlap)] if settings.overlap else []
         if settings.use_part:
-            first, last = (_number_in_take(smoke, numbers, f) for f in (settings.part_first, settings.part_last))
+            first, last = (_number_in_take(smoke, frame) for frame in (settings.part_first, settings.part_last))
             if last - first + 1 < SHORTEST:
                 raise ShotError(f"A loop needs {SHORTEST} frames at least: choose a later last frame.")
             options = ["--frames", f"{first}:{last}", *options]
         return "loop", options, []
-    return _continued(smoke, numbers)
-
-
-def _continued(smoke: bpy.types.Object, numbers: list[int]) -> tuple[str, list[str], list[bytes]]:
-    settings, scene = smoke.smokelift.directing, scene_of(smoke)
     if settings.fade > settings.frames:
         raise ShotError(
             f"The smoke fades in {settings.fade} frames, more than are added ({settings.frames}): shorten the fade."
         )
-    options = ["--frames", str(settings.frames), "--fade", str(settings.fade)]
-    options += ["--room", _number_text(settings.room)]
+    options = ["--frames", str(settings.frames), "--fade", str(settings.fade), "--room", _number_text(settings.room)]
     for name in ("buoyancy", "dissipation"):
         if getattr(settings, f"use_{name}"):
             options += [f"--{name}", _number_text(getattr(settings, name))]
-    last = numbers[-1]
+    last = now.numbers[-1]
     if settings.use_start:
-        last = _number_in_take(smoke, numbers, settings.start)
-        if last < numbers[SHORTEST - 1]:
+        last = _number_in_take(smoke, settings.start)
+        if last < now.numbers[SHORTEST - 1]:
             raise ShotError(f"{SHORTEST} frames are needed before the smoke reacts: choose a later frame.")
         options += ["--start", str(last)]
     if settings.closed:
         options += ["--closed", *(side for side in SIDES if side in settings.closed)]
     later = [volume.scene_frame(smoke, last + step) for step in range(1, settings.frames + 1)]
-    with at_frame(scene, volume.scene_frame(smoke, last)) as depsgraph:
+    with at_frame(scene_of(smoke), volume.scene_frame(smoke, last)) as depsgraph:
         options += _air_options(smoke, depsgraph)
         return "continue", options, _obstacles(smoke, depsgraph, later)
 
 
 def frames_of_result(smoke: bpy.types.Object) -> tuple[int, int] | None:
     """The first and the last frame of the result on show, counted as those of the clip; None without one."""
-    take, numbers = volume.shown_take(smoke), volume.shown_numbers(smoke)
-    if take is None or not numbers:
+    now = volume.shown(smoke)
+    if now is None:
         return None
-    before = volume.frames_before_take(smoke, take)
-    return before + numbers[0], before + numbers[-1]
+    before = volume.frames_before(smoke, volume.shown_take(smoke))
+    return before + now.numbers[0], before + now.numbers[-1]
 
 
-def _number_in_take(smoke: bpy.types.Object, numbers: list[int], frame: int) -> int:
+def _number_in_take(smoke: bpy.types.Object, frame: int) -> int:
     """The number in the take on show of a frame that is counted as those of the clip."""
-    first, last = frames_of_result(smoke) or (0, -1)
+    first, last = frames_of_result(smoke)
     if not first <= frame <= last:
         raise ShotError(f"The result has no frame {frame}: choose one from {first} to {last}.")
-    return frame - first + numbers[0]
+    return frame - volume.frames_before(smoke, volume.shown_take(smoke))
 
 
 def _air_options(smoke: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> list[str]:

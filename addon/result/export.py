@@ -7,6 +7,7 @@ that a copy at another time has a data-block of its own.
 import importlib.util
 import json
 from pathlib import Path
+from typing import Any
 
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
@@ -16,7 +17,7 @@ from ..core.contract import ASSET_FILE, EXPORT_FILE, FRAME_FILE
 from ..core.job import Job
 from ..core.sentences import disk_size
 from ..scene import volume
-from ..scene.blender import absolute, call_later, relative
+from ..scene.blender import absolute, call_later, file_of, relative
 from ..scene.look import fit_look
 from ..scene.smoke import find_smoke
 from . import smoke_takes
@@ -27,21 +28,21 @@ class SizeEstimate:
     """The size of the next export of a smoke; never saved."""
 
     def __init__(self) -> None:
-        self._of: tuple[object, ...] = ()
-        self._smoke, self._size = 0, ""
+        self._of: tuple[Any, ...] = (0,)  # number of the smoke, and what else decides the size
+        self._size = ""
         self._timer = self._start  # Blender knows a timer by the object, and each `self._start` is another
 
     def size(self, smoke: bpy.types.Object) -> str:
         """The size in words; empty until the engine has said it, which is asked once. Drawing code may call this."""
         now = (smoke.session_uid, *arguments(smoke), volume.shown_take(smoke).read().frames)
         if self._of != now and not writing_job.writing:
-            self._of, self._smoke, self._size = now, smoke.session_uid, ""
+            self._of, self._size = now, ""
             call_later(self._timer, REST_SECONDS)
         return self._size if self._of == now else ""
 
     def _start(self) -> None:
         """Ask the engine once the settings rest."""
-        smoke = find_smoke(self._smoke)
+        smoke = find_smoke(self._of[0])
         if smoke is None or writing_job.writing or volume.shown_take(smoke) is None:
             return
         try:
@@ -96,7 +97,7 @@ def copy_of(obj: bpy.types.Object, offset: int = 0, repeat: bool = False) -> bpy
     copy.delta_location = obj.delta_location  # first: the matrix has it, and gives the rest to the location
     copy.matrix_basis = obj.matrix_basis
     if obj.data.library is not None:
-        copy.data.filepath = relative(absolute(obj.data.filepath, obj.data.library))
+        copy.data.filepath = relative(file_of(obj.data))
     copy.data.frame_start += offset
     if repeat:
         copy.data.sequence_mode = "REPEAT"

@@ -49,8 +49,7 @@ def _before_save(file: str) -> None:
     for owner, name, path in _settings():
         if (bpy.data.filepath and path.startswith("//")) or name in _OWN:
             _places.append((owner, name, absolute(path)))
-    for owner, name, place in _places:
-        _set(owner, name, relative(place, Path(file).parent))
+            _set(owner, name, relative(absolute(path), Path(file).parent))
     _set_saved_as(file)
     here = Path(bpy.data.filepath).parent
     if bpy.data.filepath and here not in _folders[:1]:

@@ -30,7 +30,7 @@ def enqueue(smoke: bpy.types.Object, take: Take, settings: str = "") -> None:
         raise
     shot_check.make_way()
     done, uid = take.read().frames, smoke.session_uid
-    job = Job(words, take.log_file, volume.frames_before_take(smoke, take), done)
+    job = Job(words, take.log_file, volume.frames_before(smoke, take), done)
     runs[:] = [run for run in runs if run.smoke != uid or not run.job.ended]
     runs.append(Run(take, uid, job, (done, False), settings))
     work()
@@ -121,32 +121,22 @@ class SMOKELIFT_OT_tell(bpy.types.Operator):
         return {"FINISHED", "PASS_THROUGH"}
 
 
-_thumbnails: list[bpy.utils.previews.ImagePreviewCollection] = []
-"""The pictures of the runs while the queue is worked through: one collection, or none."""
-
-
 def _thumbnail(take: Take) -> int:
     """The icon of the take's thumbnail; 0 if there is none."""
     if not take.thumbnail_file.is_file():
         return 0
-    if not _thumbnails:
-        _thumbnails.append(bpy.utils.previews.new())
-    image = bpy.data.images.load(str(take.thumbnail_file))
-    try:
-        name = str(take.directory)
-        preview = _thumbnails[0].get(name) or _thumbnails[0].new(name)
-        preview.image_size = image.size
-        preview.image_pixels_float = image.pixels[:]
-    finally:
-        bpy.data.images.remove(image)
+    image, name = bpy.data.images.load(str(take.thumbnail_file)), str(take.directory)
+    preview = register.thumbnails.get(name) or register.thumbnails.new(name)
+    preview.image_size = image.size
+    preview.image_pixels_float = image.pixels[:]
+    bpy.data.images.remove(image)
     return preview.icon_id
 
 
 def _remove_thumbnails() -> None:
     for run in runs:
         run.icon = 0
-    while _thumbnails:
-        bpy.utils.previews.remove(_thumbnails.pop())
+    register.thumbnails.clear()
 
 
 def running() -> Run | None:
@@ -208,6 +198,7 @@ HANDLERS = ((bpy.app.handlers.load_pre, _stop_all),)
 
 def register() -> None:
     """Give Esc to the operator that asks, where nothing else takes it; without a window there are no keys."""
+    register.thumbnails = bpy.utils.previews.new()
     keys = bpy.context.window_manager.keyconfigs.addon
     if keys is not None:
         keymap = keys.keymaps.new("Window")
@@ -216,5 +207,6 @@ def register() -> None:
 
 def unregister() -> None:
     _stop_all()
+    bpy.utils.previews.remove(register.thumbnails)
     if key := register.__dict__.pop("key", None):
         key[0].keymap_items.remove(key[1])

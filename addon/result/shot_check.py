@@ -17,10 +17,9 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from ..core import ShotError
 from ..core.job import Job
 from ..core.take import Take
-from ..scene.blender import absolute, call_later, cancel_call, redraw, thread_options
+from ..scene.blender import call_later, cancel_call, redraw, thread_options
 from ..scene.box import box_corners, box_of
-from ..scene.clip import clip_path
-from ..scene.scene_file import options, shot_tables
+from ..scene.scene_file import options, shot_files, shot_tables
 from ..scene.smoke import active_smoke, find_smoke, scene_of, smokes
 from .side_job import REST_SECONDS, SideJob
 from .smoke_takes import Run, runs
@@ -201,10 +200,8 @@ def _fingerprint(smoke: bpy.types.Object, tables: Mapping[str, Any]) -> str:
     """What tells a shot from others: its scene file, options that are not `NEUTRAL`, and the state of its files."""
     settings, words = smoke.smokelift, options(smoke) + thread_options()
     neutral = (settings.quality, f"--seed={settings.seed}")
-    paths = [clip_path(settings.clip), *(absolute(path) for path in (settings.plate, settings.mask) if path)]
-    if settings.strokes is not None:
-        paths.append(absolute(settings.strokes.filepath, settings.strokes.library))
-    states = [(path.stat().st_mtime_ns, path.stat().st_size) if path.exists() else None for path in paths]
+    files = shot_files(smoke).values()
+    states = [(file.stat().st_mtime_ns, file.stat().st_size) if file.exists() else None for file in files]
     parts = repr((tables, [word for word in words if word not in neutral], states))
     return hashlib.sha256(parts.encode()).hexdigest()[:16]
 

@@ -14,10 +14,9 @@ from ..core import ShotError
 from ..core.job import Job
 from ..core.take import Take, new_take, takes
 from ..scene import shot_setup, volume
-from ..scene.blender import absolute, preferred, relative
-from ..scene.clip import clip_path
+from ..scene.blender import absolute, file_of, preferred, relative
 from ..scene.scene_file import options as engine_options
-from ..scene.scene_file import shot_tables
+from ..scene.scene_file import shot_files, shot_tables
 from ..scene.smoke import active_smoke, hide_default_cube, is_smoke, scene_of, separate_duplicate, smokes
 from . import directing
 
@@ -50,14 +49,13 @@ def output_folder(smoke: bpy.types.Object) -> Path:
     A new one is in that of the preferences, beside the .blend or beside the clip.
     """
     settings = smoke.smokelift
-    for folder in (settings.output, settings.results):
-        if folder:
-            return absolute(folder)
+    if folder := settings.output or settings.results:
+        return absolute(folder)
     if common := preferred("output"):  # a folder in which every smoke has one
         return absolute(common) / settings.folder
     if bpy.data.filepath:
         return Path(bpy.data.filepath).parent / "smokelift" / settings.folder
-    return clip_path(settings.clip).parent / f"{settings.folder}_smokelift"
+    return file_of(settings.clip).parent / f"{settings.folder}_smokelift"
 
 
 def own_takes(smoke: bpy.types.Object) -> list[Take]:
@@ -141,8 +139,8 @@ def move_results(smoke: bpy.types.Object, folder: Path) -> None:
     The folder may be the result itself. ShotError if that is not there.
     """
     settings, name = smoke.smokelift, volume.shown_take(smoke).directory.name
-    take = next((take for take in (Take(folder / name), Take(folder)) if take.directory.name == name), None)
-    if take is None or not take.read().frames:
+    take = Take(folder if folder.name == name else folder / name)
+    if not take.read().frames:
         raise ShotError(rpt_("There is no {:s} in {:s}: choose the folder that holds it.").format(name, str(folder)))
     before = Path(settings.before).name
     volume.show(smoke, take)
@@ -152,10 +150,9 @@ def move_results(smoke: bpy.types.Object, folder: Path) -> None:
 
 def find_results_again(smoke: bpy.types.Object) -> None:
     """Have a smoke know the folder of its results where an undo took that back: the results themselves stay."""
-    settings = smoke.smokelift
     name, folder = _written_to.get(smoke.session_uid, ("", None))
-    if folder is not None and name == settings.folder and not settings.results:
-        settings.results = relative(folder)
+    if folder is not None and name == smoke.smokelift.folder and not smoke.smokelift.results:
+        smoke.smokelift.results = relative(folder)
 
 
 def _note_file(*used: Take) -> None:
@@ -167,16 +164,8 @@ def _note_file(*used: Take) -> None:
 
 def update_moved_files(smoke: bpy.types.Object, take: Take) -> None:
     """Write today's paths into a resumed take's scene file, if the project was moved; ShotError if it is damaged."""
-    settings = smoke.smokelift
     if take.read().direction is None:
-        files = {("clip", "path"): clip_path(settings.clip)}
-        if settings.mask:
-            files["clip", "mask"] = absolute(settings.mask)
-        if settings.plate:
-            files["background", "image"] = absolute(settings.plate)
-        if settings.strokes is not None:
-            files["background", "strokes"] = absolute(settings.strokes.filepath, settings.strokes.library)
-        take.update_moved_files(files)
+        take.update_moved_files(shot_files(smoke))
 
 
 def unfinished(smoke: bpy.types.Object) -> Take | None:
@@ -190,11 +179,11 @@ def unfinished(smoke: bpy.types.Object) -> Take | None:
 
 def present(smoke: bpy.types.Object, take: Take) -> str:
     """Show a take's finished frames, and the camera that was assumed; returns a sentence on what else has changed."""
-    index, first = take.read().index, volume.shown_take(smoke) is None
-    if not volume.show(smoke, take) or index is None:
+    now, first = take.read(), volume.shown_take(smoke) is None
+    if not volume.show(smoke, take):
         return ""
     assumed = shot_setup.assumed_camera(smoke) is not None
-    if index["complete"] or take.read().direction is None:  # how long a directed one becomes is not known before
+    if now.complete or now.direction is None:  # how long a directed one becomes is not known before
         shot_setup.follow_range(smoke)
     hidden = first and assumed and hide_default_cube(scene_of(smoke))
     return rpt_("The cube of the new file is hidden: it stands where the smoke does.") if hidden else ""

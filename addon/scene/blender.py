@@ -10,7 +10,6 @@ from typing import Any
 
 import bpy
 import numpy as np
-import numpy.typing as npt
 from bpy.app.handlers import persistent
 
 PACKAGE = __package__.rpartition(".")[0]  # the add-on's name, under which Blender keeps its preferences
@@ -20,6 +19,11 @@ PATH_OPTIONS = {"ANIMATABLE"} | ({"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.ver
 """Options of properties that hold a path."""
 
 TOLERANCE = 1e-5  # difference, relative to the value above 1, that rounding in Blender's 32-bit numbers may make
+
+
+def file_of(data: bpy.types.ID) -> Path:
+    """The absolute path of the file of a clip, an image or a Volume."""
+    return absolute(data.filepath, data.library)
 
 
 def absolute(path: str, library: bpy.types.Library | None = None, folder: Path | None = None) -> Path:
@@ -83,9 +87,9 @@ def set_unless_changed(owner: bpy.types.ID, name: str, holder: Any, attribute: s
     The owner remembers what was set, in its custom property ``smokelift_NAME``. Blender keeps the value, a number,
     a vector or a matrix, in an attribute of the holder.
     """
-    before = owner.get(_property_name(name))
+    before, found = owner.get(_remembered(name)), np.ravel(getattr(holder, attribute))
     if before is not None:
-        found, last = _numbers(getattr(holder, attribute)), np.array(before)
+        last = np.array(before)
         if found.shape != last.shape or not np.all(abs(found - last) <= TOLERANCE * np.maximum(1.0, abs(last))):
             return
     set_and_remember(owner, name, holder, attribute, value)
@@ -94,15 +98,11 @@ def set_unless_changed(owner: bpy.types.ID, name: str, holder: Any, attribute: s
 def set_and_remember(owner: bpy.types.ID, name: str, holder: Any, attribute: str, value: Any) -> None:
     """Set a value, whatever it is, so that it follows the newest result from now on; parameters as above."""
     setattr(holder, attribute, value)
-    owner[_property_name(name)] = _numbers(getattr(holder, attribute)).tolist()
+    owner[_remembered(name)] = np.ravel(getattr(holder, attribute)).astype(float).tolist()
 
 
-def _property_name(name: str) -> str:
+def _remembered(name: str) -> str:
     return f"smokelift_{name.lower().replace(' ', '_')}"
-
-
-def _numbers(value: Any) -> npt.NDArray[np.float64]:
-    return np.ravel(value).astype(np.float64)
 
 
 def call_later(timer: Callable[[], float | None], seconds: float) -> None:
@@ -150,8 +150,8 @@ def _classes(module: ModuleType) -> list[type]:
     values = [each for value in vars(module).values() for each in (value if isinstance(value, tuple) else (value,))]
     kinds = ("Operator", "Panel", "PropertyGroup", "AddonPreferences", "FileHandler", "USDHook")
     known = tuple(getattr(bpy.types, kind) for kind in kinds if hasattr(bpy.types, kind))  # some are built without USD
-    classes = [each for each in values if isinstance(each, type) and issubclass(each, known)]
-    return [cls for cls in classes if cls.__module__ == module.__name__]
+    own = [each for each in values if isinstance(each, type) and each.__module__ == module.__name__]
+    return [cls for cls in own if issubclass(cls, known)]
 
 
 def redraw() -> None:

@@ -1,6 +1,5 @@
 """The clip in a scene file: its path, the frames that are used, their rate and their transfer function."""
 
-from pathlib import Path
 from typing import Any
 
 import bpy
@@ -8,16 +7,11 @@ import bpy
 from ..core import ShotError
 from ..core.contract import PANORAMA_SUFFIXES
 from ..core.image_sequence import ImageSequence, image_sequence_from
-from .blender import absolute, frame_rate
+from .blender import file_of, frame_rate
 from .smoke import scene_of
 
 TRANSFERS = {"sRGB": "srgb", "Linear Rec.709": "linear", "scene_linear": "linear", "Non-Color": "linear"}
 """The engine's name of the transfer function of a clip's pixels, by Blender's color space."""
-
-
-def clip_path(clip: bpy.types.MovieClip) -> Path:
-    """The absolute path of a clip."""
-    return absolute(clip.filepath, clip.library)
 
 
 def clip_table(smoke: bpy.types.Object) -> dict[str, Any]:
@@ -26,7 +20,7 @@ def clip_table(smoke: bpy.types.Object) -> dict[str, Any]:
     clip = settings.clip
     if clip is None:
         raise ShotError("Choose a clip first.")
-    path, count = clip_path(clip), frame_count(clip)
+    path, count = file_of(clip), frame_count(clip)
     if not 1 <= settings.first <= settings.last <= count:
         raise ShotError(f"Frames {settings.first} to {settings.last} are not in the clip: it has frames 1 to {count}.")
     frames = [number_in_file(clip, number) for number in (settings.first, settings.last)]
@@ -51,7 +45,7 @@ def _transfer(clip: bpy.types.MovieClip) -> str | None:
             f"The clip's color space is {space}, and only sRGB and Linear Rec.709 can be read: convert the clip, or "
             "choose another Color Space under Advanced."
         )
-    usual = "linear" if clip_path(clip).suffix.lower() in PANORAMA_SUFFIXES else "srgb"
+    usual = "linear" if file_of(clip).suffix.lower() in PANORAMA_SUFFIXES else "srgb"
     return None if TRANSFERS[space] == usual else TRANSFERS[space]
 
 
@@ -71,7 +65,7 @@ def shown_frame(smoke: bpy.types.Object) -> int:
 
 def sequence_of(clip: bpy.types.MovieClip) -> ImageSequence | None:
     """The pictures of a clip, also those after a gap, at which it ends for Blender; None of a video."""
-    return image_sequence_from(clip_path(clip)) if clip.source == "SEQUENCE" else None
+    return image_sequence_from(file_of(clip)) if clip.source == "SEQUENCE" else None
 
 
 def unseen_pictures(settings: bpy.types.PropertyGroup) -> ImageSequence | None:
@@ -84,7 +78,7 @@ def unseen_pictures(settings: bpy.types.PropertyGroup) -> ImageSequence | None:
 
 def frame_count(clip: bpy.types.MovieClip) -> int:
     """The number of frames of a clip, also of those that Blender does not find; ShotError if it cannot be read."""
-    path = clip_path(clip)
+    path = file_of(clip)
     if not path.is_file():
         raise ShotError(f"The clip {path} is not there: choose it again, or use File > External Data.")
     if clip.frame_duration < 1:  # Blender takes any file for a clip

@@ -11,10 +11,10 @@ import bpy
 from mathutils import Matrix, Vector
 
 from .box import engine_to_world
-from .nodes import Socket, Tree, color, feed, file_group, number
-from .plate import plate_image, shown_background, synchronize_plate
+from .nodes import SINCE_5, Socket, Tree, add_node, color, feed, file_group, number, set_kind
+from .plate import shown_background, synchronize_plate
 from .smoke import scene_of
-from .volume import shown_index
+from .volume import shown
 
 GROUP = "Smokelift Composite"  # name of the node group, and of its node in the scene's compositor
 MARK = "smokelift_composite"  # custom property by which the group is known under any name
@@ -33,15 +33,13 @@ _CLIP_SIZE = ("Clip Width", "Clip Height")
 LARGEST_DIFFERENCE = 0.05  # of clip and plate, blurred (linear): beyond it is smoke, whose detail is no grain
 
 _INPUTS = (
-    color("Render", "The smoke on transparent film", (0.0, 0.0, 0.0, 0.0)),
-    color("Plate", "What is behind the smoke: the clean plate, or another clip", (0.0, 0.0, 0.0, 1.0)),
-    color("Clip", "The clip, from which the grain and the foreground are taken", (0.0, 0.0, 0.0, 1.0)),
-    number("Foreground", "Mask of what is in front of the smoke in the clip", 0.0, 0.0, 1.0),
-    number("Grain", "Strength of the clip's grain on plate and smoke; 0 is none", 1.0, 0.0, 10.0),
-    *(number(name, "Pixels of the clip, whatever the render's size", 1.0, 1.0) for name in _CLIP_SIZE),
+    color("Render", 0.0, 0.0, 0.0, 0.0)("The smoke on transparent film"),
+    color("Plate", 0.0, 0.0, 0.0, 1.0)("What is behind the smoke: the clean plate, or another clip"),
+    color("Clip", 0.0, 0.0, 0.0, 1.0)("The clip, from which the grain and the foreground are taken"),
+    number("Foreground", 0.0, 0.0, 1.0)("Mask of what is in front of the smoke in the clip"),
+    number("Grain", 1.0, 0.0, 10.0)("Strength of the clip's grain on plate and smoke; 0 is none"),
+    *(number(name, 1.0, 1.0)("Pixels of the clip, whatever the render's size") for name in _CLIP_SIZE),
 )
-
-SINCE_5 = bpy.app.version >= (5, 0, 0)  # the compositor is a node group, with the shaders' Mix node
 
 
 def composite(smoke: bpy.types.Object) -> None:
@@ -51,16 +49,19 @@ def composite(smoke: bpy.types.Object) -> None:
         scene[_ENGINE] = scene.render.engine
         scene.render.engine = "CYCLES"  # EEVEE has no shadow catcher
     scene.render.film_transparent = True
-    _catch_shadow(scene, smoke, shown_index(smoke)["scene"]["domain"])
-    _hold_out(scene)
-    tree, shown = compositor(scene)
+    _catch_shadow(scene, smoke, shown(smoke).scene["domain"])
+    if HOLDOUTS not in scene.collection.children:
+        held = bpy.data.collections.new(HOLDOUTS)
+        scene.collection.children.link(held)
+        for layer in scene.view_layers:
+            layer.layer_collection.children[held.name].holdout = True
+    tree, output = compositor(scene)
     node = tree.nodes.get(GROUP)
     if node is None:
-        node = _insert(tree, shown)
+        node = _insert(tree, output)
     elif node.mute:
         _show(scene, node, True)
-    _connect_plate(tree, node, smoke)
-    _connect_clip(tree, node, smoke.smokelift.clip)
+    _connect(tree, node, smoke)
 
 
 def disable_composite(scene: bpy.types.Scene) -> None:
@@ -106,16 +107,6 @@ def _catch_shadow(scene: bpy.types.Scene, smoke: bpy.types.Object, domain: dict[
     scene.collection.objects.link(plane)
 
 
-def _hold_out(scene: bpy.types.Scene) -> None:
-    """A collection for what hides the smoke, unless the scene has one."""
-    if HOLDOUTS in scene.collection.children:
-        return
-    scene.collection.children.link(bpy.data.collections.new(HOLDOUTS))
-    name = scene.collection.children[-1].name
-    for layer in scene.view_layers:
-        layer.layer_collection.children[name].holdout = True
-
-
 def compositor(scene: bpy.types.Scene) -> tuple[Tree, Socket]:
     """The scene's compositor, made if there is none, and the socket of its output."""
     if SINCE_5:
@@ -142,10 +133,8 @@ def _insert(tree: Tree, shown: Socket) -> bpy.types.Node:
         layers = next((node for node in tree.nodes if node.type == "R_LAYERS"), None)
         layers = layers or tree.nodes.new("CompositorNodeRLayers")
         render = layers.outputs["Image"]
-    node = tree.nodes.new("CompositorNodeGroup")
-    node.node_tree = file_group(GROUP, "CompositorNodeTree", MARK, _INPUTS, {"Image": "NodeSocketColor"}, _build)
-    node.name = node.label = GROUP
-    node.width = 200.0
+    group = file_group(GROUP, "CompositorNodeTree", MARK, _INPUTS, {"Image": "NodeSocketColor"}, _build)
+    node = add_node(tree, "CompositorNodeGroup", 0, 0, node_tree=group, name=GROUP, width=200.0)
     node.location = render.node.location + Vector((render.node.width + 60.0, 0.0))
     shown.node.location = node.location + Vector((node.width + 60.0, 0.0))
     tree.links.new(render, node.inputs["Render"])
@@ -153,25 +142,21 @@ def _insert(tree: Tree, shown: Socket) -> bpy.types.Node:
     return node
 
 
-def _connect_plate(tree: Tree, node: bpy.types.Node, smoke: bpy.types.Object) -> None:
-    """Feed the plate's socket, whose source has our name unless the artist put another there."""
-    background = shown_background(smoke)
-    source = _source(tree, "CompositorNodeImage", node, "Plate", -300.0)
-    if source is None:
-        return
-    if "image" in background:
-        source.image = plate_image(smoke)
-        synchronize_plate(smoke, source.image, source)
-    else:
-        tree.nodes.remove(source)
-        node.inputs["Plate"].default_value = (*background.get("color", (0.0, 0.0, 0.0)), 1.0)
-
-
-def _connect_clip(tree: Tree, node: bpy.types.Node, clip: bpy.types.MovieClip) -> None:
+def _connect(tree: Tree, node: bpy.types.Node, smoke: bpy.types.Object) -> None:
+    """Feed the sockets of clip and plate, whose sources have our names unless the artist put others there."""
+    clip = smoke.smokelift.clip
     for side, pixels in zip(_CLIP_SIZE, clip.size, strict=True):
         if side in node.inputs:  # the group may be an artist's own
             node.inputs[side].default_value, node.inputs[side].hide = pixels, True
-    source = _source(tree, "CompositorNodeMovieClip", node, "Clip", -600.0)
+    plate, one_color = shown_background(smoke)
+    source = _source(tree, "CompositorNodeImage", node, "Plate", 1.5)
+    if source is not None and plate is not None:
+        source.image = plate
+        synchronize_plate(smoke, plate, source)
+    elif source is not None:
+        tree.nodes.remove(source)
+        node.inputs["Plate"].default_value = one_color
+    source = _source(tree, "CompositorNodeMovieClip", node, "Clip", 3.0)
     if source is not None:
         source.clip = clip
 
@@ -180,9 +165,7 @@ def _source(tree: Tree, kind: str, node: bpy.types.Node, socket: str, down: floa
     """Our node of pictures that feeds a socket of ours, made if need be; None where the artist put another there."""
     source = tree.nodes.get(f"{GROUP} {socket}")
     if source is None and not node.inputs[socket].links:
-        source = tree.nodes.new(kind)
-        source.name = source.label = f"{GROUP} {socket}"
-        source.location = node.location + Vector((-300.0, down))
+        source = add_node(tree, kind, -1.5, down, near=node, name=f"{GROUP} {socket}")
         tree.links.new(source.outputs["Image"], node.inputs[socket])
     return source
 
@@ -192,7 +175,7 @@ def _build(tree: Tree) -> None:
     given, output = tree.nodes.new("NodeGroupInput"), tree.nodes.new("NodeGroupOutput")
     source = given.outputs
     over = tree.nodes.new("CompositorNodeAlphaOver")
-    below, above = (over.inputs[0], over.inputs[1]) if SINCE_5 else (over.inputs[1], over.inputs[2])
+    below, above = over.inputs[:2] if SINCE_5 else over.inputs[1:3]
     tree.links.new(_scaled(tree, source["Plate"], "Render Size"), below)
     tree.links.new(source["Render"], above)
     grain = _scaled(tree, _grain(tree, source), "Render Size")
@@ -224,12 +207,8 @@ def _grain(tree: Tree, source: bpy.types.bpy_prop_collection) -> Socket:
 
 def _scaled(tree: Tree, picture: Socket, kind: str) -> Socket:
     """A picture at the render's size, or at an absolute one."""
-    node = tree.nodes.new("CompositorNodeScale")
-    if "Type" in node.inputs:  # since 5.0
-        node.inputs["Type"].default_value = kind
-    else:
-        node.space = kind.upper().replace(" ", "_")
-    tree.links.new(picture, node.inputs["Image"])
+    node = add_node(tree, "CompositorNodeScale", 0, 0, picture)
+    set_kind(node, kind, "space")
     return node.outputs[0]
 
 
@@ -251,10 +230,9 @@ def _mix(tree: Tree, blend: str, factor: Any, a: Any, b: Any, clamp: bool = Fals
 
 
 def _blurred(tree: Tree, picture: Socket) -> Socket:
-    node = tree.nodes.new("CompositorNodeBlur")
+    node = add_node(tree, "CompositorNodeBlur", 0, 0, picture)
     if "Size" in node.inputs and node.inputs["Size"].type == "VECTOR":  # since 4.5
         node.inputs["Size"].default_value = [GRAIN_PIXELS] * len(node.inputs["Size"].default_value)
     else:
         node.size_x = node.size_y = GRAIN_PIXELS
-    tree.links.new(picture, node.inputs["Image"])
     return node.outputs[0]

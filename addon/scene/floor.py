@@ -42,27 +42,22 @@ class Floor:
         along = (back.dot(up) * up - back).normalized()
         return cls(rotation, *sides_of(box, rotation), pose.translation, along)
 
-    def place(self, origin: Vector, direction: Vector) -> Vector:
-        """Where a ray in Blender's world meets the floor, in the engine's axes; ShotError if it does not."""
-        start, way = self.rotation.inverted() @ origin, self.rotation.inverted() @ direction
-        steps = (self.low.z - start.z) / way.z if way.z else -1.0
-        if steps <= 0.0:
-            raise ShotError("The floor of the box is not seen there: click lower, right below the smoke.")
-        return start + steps * way
-
-    def distance(self, place: Vector) -> float:
-        """Level distance of a place from the camera, straight ahead."""
-        return (place - self.eye).dot(self.along)
-
     def clicked(self, rays: Sequence[tuple[Vector, Vector]]) -> float:
-        """The distance of where the first of two rays, of neighboring pixels, meets the floor.
+        """The level distance, straight ahead, of where the first of two rays of neighboring pixels meets the floor.
 
-        ShotError if that is outside the box, or so flat that a pixel more is much nearer.
+        ShotError if that is nowhere, outside the box, or so flat that a pixel more is much nearer.
         """
-        place, beside = (self.place(*ray) for ray in rays)
-        if not all(self.low[axis] <= place[axis] <= self.high[axis] for axis in (0, 1)):
+        places, to_engine = [], self.rotation.inverted()
+        for origin, direction in rays:
+            start, way = to_engine @ origin, to_engine @ direction
+            steps = (self.low.z - start.z) / way.z if way.z else -1.0
+            if steps <= 0.0:
+                raise ShotError("The floor of the box is not seen there: click lower, right below the smoke.")
+            places.append(start + steps * way)
+        if not all(self.low[axis] <= places[0][axis] <= self.high[axis] for axis in (0, 1)):
             raise ShotError("That is outside the box: click in the box, or move the box so that it holds the smoke.")
+        distance, beside = ((place - self.eye).dot(self.along) for place in places)
         depth = sum(abs(self.along[axis]) * (self.high[axis] - self.low[axis]) for axis in range(3))
-        if abs(self.distance(beside) - self.distance(place)) > MAX_PIXEL_DEPTH * depth:
+        if abs(beside - distance) > MAX_PIXEL_DEPTH * depth:
             raise ShotError("The camera is too near to the floor to show depth there: enter the Distance by hand.")
-        return self.distance(place)
+        return distance

@@ -8,12 +8,14 @@ from mathutils import Matrix, Vector
 
 from ..core import ShotError
 from ..core.contract import PANORAMA_SUFFIXES
-from .blender import absolute
+from .blender import file_of
 from .box import is_inside
 
 
-def light_tables(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, rotation: Matrix) -> list[dict[str, Any]]:
-    """The scene's suns and point lights, and the picture that lights its world."""
+def light_tables(
+    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, rotation: Matrix, domain: dict[str, Any] | None
+) -> list[dict[str, Any]]:
+    """The scene's suns and point lights, which stand outside the domain, and the picture that lights its world."""
     to_engine, tables, unusable = rotation.inverted(), [], []
     for obj in scene.objects:
         if obj.type != "LIGHT" or obj.hide_render:
@@ -22,10 +24,10 @@ def light_tables(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, rotatio
         matrix = obj.evaluated_get(depsgraph).matrix_world
         if light.type == "SUN":
             direction = to_engine @ -matrix.to_3x3().col[2].normalized()
-            tables.append({"type": "directional", "direction": list(direction), "irradiance": sun_irradiance(light)})
+            tables.append({"type": "directional", "direction": list(direction), "irradiance": emitted(light)})
         elif light.type == "POINT":
-            position = to_engine @ matrix.translation
-            tables.append({"type": "point", "position": list(position), "intensity": point_intensity(light)})
+            position, intensity = to_engine @ matrix.translation, emitted(light, 1.0 / (4 * math.pi))
+            tables.append({"type": "point", "position": list(position), "intensity": intensity})
         else:
             unusable.append(obj.name)
     tables += _world_tables(scene, rotation)
@@ -34,24 +36,20 @@ def light_tables(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, rotatio
         raise ShotError(
             f"The scene has no sun, point light or world picture{others}: add one, or choose light From the Clip."
         )
+    places = [light["position"] for light in tables if light["type"] == "point"]
+    if domain is not None and any(is_inside(domain["min"], domain["max"], place) for place in places):
+        raise ShotError("A point light is inside the box: move it out, or hide it from renders.")
     return tables
 
 
-def sun_irradiance(light: bpy.types.Light) -> list[float]:
-    """Irradiance (W/m^2) of a sun, red, green and blue: Blender's strength."""
-    return [light.energy * part for part in _emitted(light)]
+def emitted(light: bpy.types.Light, scale: float = 1.0) -> list[float]:
+    """The strength of a light in red, green and blue, times a number: of a sun its irradiance (W/m^2).
 
-
-def point_intensity(light: bpy.types.Light) -> list[float]:
-    """Intensity (W/sr) of a point light, red, green and blue: its power over the sphere's 4 pi."""
-    return [light.energy * part / (4 * math.pi) for part in _emitted(light)]
-
-
-def _emitted(light: bpy.types.Light) -> list[float]:
-    """Strength in red, green and blue. Older versions of Blender lack exposure and temperature."""
-    factor = 2.0 ** getattr(light, "exposure", 0.0)
+    That of a point light (W), over the sphere's 4 pi, is its intensity (W/sr).
+    """
+    scale *= light.energy * 2.0 ** getattr(light, "exposure", 0.0)  # older versions of Blender lack it, and temperature
     warmth = light.temperature_color if getattr(light, "use_temperature", False) else (1.0, 1.0, 1.0)
-    return [factor * a * b for a, b in zip(light.color, warmth, strict=True)]
+    return [scale * a * b for a, b in zip(light.color, warmth, strict=True)]
 
 
 def _world_tables(scene: bpy.types.Scene, rotation: Matrix) -> list[dict[str, Any]]:
@@ -68,7 +66,7 @@ def _world_tables(scene: bpy.types.Scene, rotation: Matrix) -> list[dict[str, An
         strength = node.inputs["Strength"].default_value
         if source is None or source.type != "TEX_ENVIRONMENT" or source.image is None or strength == 0.0:
             continue
-        path = absolute(source.image.filepath, source.image.library)
+        path = file_of(source.image)
         if source.projection != "EQUIRECTANGULAR" or path.suffix.lower() not in PANORAMA_SUFFIXES:
             raise ShotError(
                 f"The world's picture {source.image.name} cannot be used: it has to be an .exr or .hdr panorama."
@@ -91,10 +89,3 @@ def _mapping(texture: bpy.types.ShaderNode) -> Matrix:
         return Matrix.Identity(3)
     rotation = node.inputs["Rotation"].default_value.to_matrix()
     return rotation.inverted() if node.vector_type == "TEXTURE" else rotation
-
-
-def require_lights_outside(tables: dict[str, Any]) -> None:
-    """Refuse a point light inside the box."""
-    domain, places = tables.get("domain"), [light["position"] for light in tables["lights"] if light["type"] == "point"]
-    if domain is not None and any(is_inside(domain["min"], domain["max"], place) for place in places):
-        raise ShotError("A point light is inside the box: move it out, or hide it from renders.")

@@ -18,41 +18,29 @@ BLACKBODY_KELVIN = 1000.0  # temperature that a grid's value of 1 stands for; th
 MIN_RATIO = 1e-3  # density over the edge's, below which edges do not change any more; keeps the power of it finite
 
 _INPUTS = (
-    number("Density", "Times what was fitted to the clip", 1.0, 0.0, 1e6),
-    number(
-        "Brightness",
-        "Below 1 darker; above 1 the fraction of light that the smoke absorbs is divided by this",
-        1.0,
-        0.0,
-        1e3,
+    number("Density", 1.0, 0.0, 1e6)("Times what was fitted to the clip"),
+    number("Brightness", 1.0, 0.0, 1e3)(
+        "Below 1 darker; above 1 the fraction of light that the smoke absorbs is divided by this"
     ),
-    color("Color", "Times the albedo: the color of the smoke in white light", (1.0, 1.0, 1.0, 1.0)),
-    number("Edge Contrast", "Above 1 thin smoke gets thinner, below 1 thicker", 1.0, 0.0, 10.0),
-    color("Absorption Color", "Color of the light that gets through the smoke", (0.0, 0.0, 0.0, 1.0)),
-    number(
-        "Evaporation",
+    color("Color", 1.0, 1.0, 1.0, 1.0)("Times the albedo: the color of the smoke in white light"),
+    number("Edge Contrast", 1.0, 0.0, 10.0)("Above 1 thin smoke gets thinner, below 1 thicker"),
+    color("Absorption Color", 0.0, 0.0, 0.0, 1.0)("Color of the light that gets through the smoke"),
+    number("Evaporation", 0.0, 0.0, 1e3)(
         "Smoke that is gone at the top of the clip's box, in Edge Densities: the higher it is the more of it, from its "
-        "edges inwards",
-        0.0,
-        0.0,
-        1e3,
+        "edges inwards"
     ),
-    number("Anisotropy", "Forward scattering above 0, backward below; fitted", 0.0, -1.0, 1.0),
-    number("Extinction", "Per meter of smoke of density 1; fitted to the clip", 1.0, 0.0, 1e9),
-    color("Albedo", "Scattered fraction of the extinction; fitted", (0.9, 0.9, 0.9, 1.0)),
-    number("Edge Density", "Density below which smoke counts as thin: where Edge Contrast changes it", 0.1, 1e-9, 1e9),
-    number("Floor", "Height in the smoke where evaporation begins; fitted", 0.0, -1e6, 1e6),
-    number("Height", "From there to where all of it counts; fitted", 1.0, 1e-6, 1e6),
-    number(
-        "Flame Strength",
-        "Times the light of the grid flame, if there is one; 1 is as bright as in the clip",
-        1.0,
-        0.0,
-        1e6,
+    number("Anisotropy", 0.0, -1.0, 1.0)("Forward scattering above 0, backward below; fitted"),
+    number("Extinction", 1.0, 0.0, 1e9)("Per meter of smoke of density 1; fitted to the clip"),
+    color("Albedo", 0.9, 0.9, 0.9, 1.0)("Scattered fraction of the extinction; fitted"),
+    number("Edge Density", 0.1, 1e-9, 1e9)("Density below which smoke counts as thin: where Edge Contrast changes it"),
+    number("Floor", 0.0, -1e6, 1e6)("Height in the smoke where evaporation begins; fitted"),
+    number("Height", 1.0, 1e-6, 1e6)("From there to where all of it counts; fitted"),
+    number("Flame Strength", 1.0, 0.0, 1e6)(
+        "Times the light of the grid flame, if there is one; 1 is as bright as in the clip"
     ),
-    color("Flame Color", "Color of the light of the grid flame; fitted to the clip", (1.0, 0.35, 0.08, 1.0)),
-    number("Blackbody Intensity", "Glow of the grid temperature, if there is one", 1.0, 0.0, 1.0),
-    number("Temperature", "Kelvin that a value of 1 in the grid temperature stands for", BLACKBODY_KELVIN, 0.0, 1e5),
+    color("Flame Color", 1.0, 0.35, 0.08, 1.0)("Color of the light of the grid flame; fitted to the clip"),
+    number("Blackbody Intensity", 1.0, 0.0, 1.0)("Glow of the grid temperature, if there is one"),
+    number("Temperature", BLACKBODY_KELVIN, 0.0, 1e5)("Kelvin that a value of 1 in the grid temperature stands for"),
 )
 
 CONTROLS = tuple(item.name for item in _INPUTS[:7])
@@ -162,12 +150,9 @@ def use_preset(smoke: bpy.types.Object, name: str, fitted_anisotropy: float) -> 
 def _new_material(name: str) -> bpy.types.Material:
     material = empty_material(name)
     tree = material.node_tree
-    output = tree.nodes.new("ShaderNodeOutputMaterial")
-    node = tree.nodes.new("ShaderNodeGroup")
-    node.node_tree = file_group(GROUP, "ShaderNodeTree", MARK, _INPUTS, {"Volume": "NodeSocketShader"}, _build)
-    node.name = node.label = NODE
-    node.width, node.location = 220.0, (-300.0, 0.0)
-    tree.links.new(node.outputs[0], output.inputs["Volume"])
+    group = file_group(GROUP, "ShaderNodeTree", MARK, _INPUTS, {"Volume": "NodeSocketShader"}, _build)
+    node = add_node(tree, "ShaderNodeGroup", -1.5, 0, node_tree=group, name=NODE, width=220.0)
+    tree.links.new(node.outputs[0], add_node(tree, "ShaderNodeOutputMaterial", 0, 0).inputs["Volume"])
     return material
 
 

@@ -14,6 +14,7 @@ import bpy
 from ..core import ShotError
 from .blender import absolute
 from .clip import frame_count
+from .nodes import add_node
 from .pictures import picture_scene
 from .smoke import scene_of
 
@@ -67,9 +68,7 @@ def _drawn(smoke: bpy.types.Object, quick: bool) -> Path:
             return found
         if bpy.app.is_job_running("RENDER"):
             raise ShotError("Blender renders, and the mask has to be drawn: wait for its end.")
-        node = tree.nodes.new("CompositorNodeMask")
-        node.mask = mask
-        tree.links.new(node.outputs[0], output)
+        tree.links.new(add_node(tree, "CompositorNodeMask", 0, 0, mask=mask).outputs[0], output)
         scene.view_settings.view_transform = "Raw"
         scene.render.image_settings.color_mode = "BW"
         scene.render.dither_intensity = 0.0  # noise, which takes a third of the time

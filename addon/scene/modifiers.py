@@ -16,7 +16,19 @@ import bpy
 
 from ..core.contract import PROXY_FILE, PROXY_VOXELS
 from ..core.take import Take
-from .nodes import Input, Socket, Tree, add_node, file_group, get_input, input_path, math_node, number, set_input
+from .nodes import (
+    SINCE_5,
+    Input,
+    Socket,
+    Tree,
+    add_node,
+    file_group,
+    get_input,
+    input_path,
+    math_node,
+    number,
+    set_input,
+)
 
 
 @dataclass(frozen=True)
@@ -92,9 +104,9 @@ def in_viewport(smoke: bpy.types.Object) -> bpy.types.Volume:
     return proxy if proxy is not None and modifier.show_viewport else smoke.data
 
 
-def lacks_proxy(smoke: bpy.types.Object, index: Mapping[str, Any]) -> bool:
-    """Whether a smoke is large for a viewport and has no proxy, as an earlier result; ``index`` is that of its take."""
-    return PROXY.modifier(smoke) is None and math.prod(index["scene"]["domain"]["resolution"]) >= PROXY_VOXELS
+def lacks_proxy(smoke: bpy.types.Object, domain: Mapping[str, Any]) -> bool:
+    """Whether a smoke of a domain is large for a viewport and has no proxy, as an earlier result."""
+    return PROXY.modifier(smoke) is None and math.prod(domain["resolution"]) >= PROXY_VOXELS
 
 
 def fit_proxy(smoke: bpy.types.Object, take: Take, numbers: list[int]) -> None:
@@ -105,14 +117,14 @@ def fit_proxy(smoke: bpy.types.Object, take: Take, numbers: list[int]) -> None:
         PROXY.remove(smoke)
 
 
-CAN_INTERPOLATE = bpy.app.version >= (5, 0, 0)  # whether this Blender has nodes that move grids
+CAN_INTERPOLATE = SINCE_5  # whether this Blender has nodes that move grids
 GRIDS = ("density", "flame")  # what is moved, where the files have it
 
 _INTERPOLATION_INPUTS = (
     Input("Smoke", "NodeSocketGeometry", "The frame before"),
     Input("Next Frame", "NodeSocketObject", "Volume that plays the same files a frame earlier"),
-    number("Part", "How far it is from the frame before, 0, to the frame after, 1", 0.0, 0.0, 1.0),
-    number("Seconds", "From the frame before to the frame after", 1.0, 0.0),
+    number("Part", 0.0, 0.0, 1.0)("How far it is from the frame before, 0, to the frame after, 1"),
+    number("Seconds", 1.0, 0.0)("From the frame before to the frame after"),
 )
 
 

@@ -4,9 +4,11 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import bpy
+from mathutils import Vector
 
 Tree, Socket = bpy.types.NodeTree, bpy.types.NodeSocket
 
+SINCE_5 = bpy.app.version >= (5, 0, 0)  # the compositor is a node group, with the shaders' Mix node
 SPACING = 200.0  # distance from one column or row of nodes to the next
 
 
@@ -21,16 +23,17 @@ class Input(NamedTuple):
     high: float | None = None
 
 
-def number(
-    name: str, description: str, default: float = 0.0, low: float | None = None, high: float | None = None
-) -> Input:
+Described = Callable[[str], Input]  # makes an input of its tooltip
+
+
+def number(name: str, default: float = 0.0, low: float | None = None, high: float | None = None) -> Described:
     """An input that is a number."""
-    return Input(name, "NodeSocketFloat", description, default, low, high)
+    return lambda description: Input(name, "NodeSocketFloat", description, default, low, high)
 
 
-def color(name: str, description: str, default: tuple[float, float, float, float]) -> Input:
+def color(name: str, *default: float) -> Described:
     """An input that is a color with alpha."""
-    return Input(name, "NodeSocketColor", description, default)
+    return lambda description: Input(name, "NodeSocketColor", description, default)
 
 
 def empty_material(name: str) -> bpy.types.Material:
@@ -70,17 +73,21 @@ def file_group(
     return tree
 
 
-def add_node(tree: Tree, kind: str, column: float, row: float, *inputs: Any, **settings: Any) -> bpy.types.Node:
-    """Add a node at a place of the grid that `SPACING` makes, with these values of its attributes.
+def add_node(
+    tree: Tree, kind: str, column: float, row: float, *inputs: Any, name: str = "", near: Any = None, **settings: Any
+) -> bpy.types.Node:
+    """Add a node at a place of the grid that `SPACING` makes, near another if there is one, with these attributes.
 
     Sockets of other nodes, or values, feed its first inputs, in their order, after the attributes are set.
     """
     node = tree.nodes.new(kind)
-    node.location = (SPACING * column, -SPACING * row)
-    for name, value in settings.items():
-        setattr(node, name, value)
-    for number, value in enumerate(inputs):
-        feed(tree, node.inputs[number], value)
+    node.location = Vector((SPACING * column, -SPACING * row)) + (near.location if near else Vector((0.0, 0.0)))
+    if name:
+        node.name = node.label = name
+    for attribute, value in settings.items():
+        setattr(node, attribute, value)
+    for place, value in enumerate(inputs):
+        feed(tree, node.inputs[place], value)
     return node
 
 
@@ -99,6 +106,14 @@ def scaled_vector(tree: Tree, column: float, row: float, vector: Any, factor: So
     node = add_node(tree, "ShaderNodeVectorMath", column, row, vector, operation="SCALE")
     tree.links.new(factor, node.inputs["Scale"])
     return node.outputs["Vector"]
+
+
+def set_kind(node: bpy.types.Node, kind: str, attribute: str) -> None:
+    """Choose what kind a node of the compositor is: by its input Type, which is an attribute before 5.0."""
+    if SINCE_5:
+        node.inputs["Type"].default_value = kind
+    else:
+        setattr(node, attribute, kind.upper().replace(" ", "_"))
 
 
 def feed(tree: Tree, socket: Socket, value: Any) -> None:

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import bpy
 
-from .compositing import SINCE_5, compositor
-from .nodes import Socket, Tree
+from .compositing import compositor
+from .nodes import SINCE_5, Socket, Tree, add_node, set_kind
 
 UNDISTORTED_BITS, FILMED_BITS = "16", "8"  # per channel of a picture that is computed anew, and as it was filmed
 
@@ -56,23 +56,14 @@ def write_pictures(clip: bpy.types.MovieClip, first: int, last: int, prefix: Pat
         scene.render.filepath = str(prefix)
         picture = scene.render.image_settings
         picture.color_mode, picture.color_depth = "RGB", UNDISTORTED_BITS if undistort else FILMED_BITS
-        source = tree.nodes.new("CompositorNodeMovieClip")
-        source.clip = clip
-        pictures = source.outputs["Image"]
-        tree.links.new(_undistorted(tree, clip, pictures) if undistort else pictures, shown)
+        pictures = add_node(tree, "CompositorNodeMovieClip", 0, 0, clip=clip).outputs["Image"]
+        if undistort:
+            lens = add_node(tree, "CompositorNodeMovieDistortion", 1, 0, pictures, clip=clip)
+            set_kind(lens, "Undistort", "distortion_type")
+            pictures = lens.outputs["Image"]
+        tree.links.new(pictures, shown)
         bpy.ops.render.render(animation=True, scene=scene.name)
         return Path(scene.render.frame_path(frame=first))
-
-
-def _undistorted(tree: Tree, clip: bpy.types.MovieClip, pictures: Socket) -> Socket:
-    lens = tree.nodes.new("CompositorNodeMovieDistortion")
-    lens.clip = clip
-    if "Type" in lens.inputs:  # since 5.0
-        lens.inputs["Type"].default_value = "Undistort"
-    else:
-        lens.distortion_type = "UNDISTORT"
-    tree.links.new(pictures, lens.inputs["Image"])
-    return lens.outputs["Image"]
 
 
 def is_distorted(clip: bpy.types.MovieClip) -> bool:

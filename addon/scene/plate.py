@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import bpy
@@ -12,7 +11,7 @@ from ..core import ShotError
 from . import volume
 from .blender import absolute, relative
 from .clip import frame_count, number_in_file
-from .nodes import Socket, Tree
+from .nodes import Socket, Tree, add_node
 from .strokes import saved_strokes
 
 MARK = "smokelift_plate"  # custom property of pictures that a camera's view shows behind smoke
@@ -23,7 +22,12 @@ def background_table(smoke: bpy.types.Object) -> dict[str, Any]:
     """The table; empty where the engine estimates the background. ShotError if a picture or a frame is missing."""
     settings, table = smoke.smokelift, {}
     if settings.plate_mode == "FILE":
-        table["image"] = str(_plate(settings.plate))
+        if not settings.plate:
+            raise ShotError("Choose the clean plate, or choose From the Clip.")
+        file = absolute(settings.plate)
+        if not file.is_file():
+            raise ShotError(f"The clean plate {file} is not there: choose it again.")
+        table["image"] = str(file)
     elif settings.plate_mode == "FRAMES":
         table["frame"] = [number_in_file(settings.clip, number) for number in _clean_frames(settings)]
     elif settings.plate_mode == "COLOR":
@@ -31,15 +35,6 @@ def background_table(smoke: bpy.types.Object) -> dict[str, Any]:
     if settings.strokes is not None:
         table["strokes"] = str(saved_strokes(settings.strokes, settings.clip))
     return table
-
-
-def _plate(path: str) -> Path:
-    if not path:
-        raise ShotError("Choose the clean plate, or choose From the Clip.")
-    file = absolute(path)
-    if not file.is_file():
-        raise ShotError(f"The clean plate {file} is not there: choose it again.")
-    return file
 
 
 def _clean_frames(settings: bpy.types.PropertyGroup) -> list[int]:
@@ -55,19 +50,17 @@ def _clean_frames(settings: bpy.types.PropertyGroup) -> list[int]:
     return sorted({int(word) for word in words})
 
 
-def shown_background(smoke: bpy.types.Object) -> dict[str, Any]:
-    """The table of the background of the result on show; empty where black was assumed."""
-    return volume.shown_index(smoke)["scene"].get("background") or {}
-
-
-def plate_image(smoke: bpy.types.Object) -> bpy.types.Image:
-    """The plate of the result on show, by a path relative to the .blend where there is one."""
-    file = Path(shown_background(smoke)["image"])
-    file = file if file.is_absolute() else volume.shown_take(smoke).directory / file
+def shown_background(smoke: bpy.types.Object) -> tuple[bpy.types.Image | None, tuple[float, float, float, float]]:
+    """The plate of the result on show, by a path relative to the .blend where there is one; or None, and one color."""
+    background = volume.shown(smoke).scene.get("background") or {}
+    color = (*background.get("color", (0.0, 0.0, 0.0)), 1.0)
+    if "image" not in background:
+        return None, color
+    file = volume.shown_take(smoke).directory / background["image"]
     image = bpy.data.images.load(str(file), check_existing=True)
     if image.filepath != relative(file):
         image.filepath = relative(file)
-    return image
+    return image, color
 
 
 def show_plate(smoke: bpy.types.Object, tree: Tree, shader: bpy.types.ShaderNode, place: Callable[[], Socket]) -> None:
@@ -75,22 +68,19 @@ def show_plate(smoke: bpy.types.Object, tree: Tree, shader: bpy.types.ShaderNode
 
     It has an input Color. If no texture is connected to that yet, ``place`` makes coordinates in the plate.
     """
-    color, background = shader.inputs["Color"], shown_background(smoke)
-    if "image" not in background:
+    color, (image, shown) = shader.inputs["Color"], shown_background(smoke)
+    if image is None:
         for link in list(color.links):
             tree.links.remove(link)
-        color.default_value = (*background.get("color", (0.0, 0.0, 0.0)), 1.0)
+        color.default_value = shown
         return
     if not color.links:
-        texture, coordinates = tree.nodes.new("ShaderNodeTexImage"), place()
-        texture.extension = "EXTEND"
-        tree.links.new(coordinates, texture.inputs["Vector"])
+        texture = add_node(tree, "ShaderNodeTexImage", -1.5, 0, place(), near=shader, extension="EXTEND")
+        texture.inputs[0].links[0].from_node.location = shader.location - Vector((500.0, 0.0))
         tree.links.new(texture.outputs["Color"], color)
-        for node, left in ((texture, 300.0), (coordinates.node, 500.0)):
-            node.location = shader.location - Vector((left, 0.0))
     node = color.links[0].from_node
-    node.image = plate_image(smoke)
-    synchronize_plate(smoke, node.image, node.image_user)
+    node.image = image
+    synchronize_plate(smoke, image, node.image_user)
 
 
 def show_plate_behind(smoke: bpy.types.Object, camera: bpy.types.Camera) -> None:
@@ -99,13 +89,10 @@ def show_plate_behind(smoke: bpy.types.Object, camera: bpy.types.Camera) -> None
     The second time only the picture changes: what the artist shows or hides stays.
     """
     camera.show_background_images = True
-    pictures, background = camera.background_images, shown_background(smoke)
-    if "image" in background:
-        image = plate_image(smoke)
-    else:
-        image = bpy.data.images.get(BACKGROUND) or bpy.data.images.new(BACKGROUND, 8, 8)
-        color = Color(background.get("color", (0.0, 0.0, 0.0))).from_scene_linear_to_srgb()
-        image.generated_color = (*color, 1.0)
+    pictures, (plate, color) = camera.background_images, shown_background(smoke)
+    image = plate or bpy.data.images.get(BACKGROUND) or bpy.data.images.new(BACKGROUND, 8, 8)
+    if plate is None:
+        image.generated_color = (*Color(color[:3]).from_scene_linear_to_srgb(), 1.0)
     image[MARK] = True
     picture = next((each for each in pictures if each.source == "IMAGE" and each.image and each.image.get(MARK)), None)
     if picture is None:
@@ -116,8 +103,8 @@ def show_plate_behind(smoke: bpy.types.Object, camera: bpy.types.Camera) -> None
         _new_picture(camera, "MOVIE_CLIP").clip = smoke.smokelift.clip
         clip_behind(smoke, camera).show_background_image = False
     picture.image = image
-    if "image" in background:
-        synchronize_plate(smoke, image, picture.image_user)
+    if plate is not None:
+        synchronize_plate(smoke, plate, picture.image_user)
 
 
 def show_clip_behind(smoke: bpy.types.Object, camera: bpy.types.Camera) -> None:
@@ -146,7 +133,7 @@ def synchronize_plate(smoke: bpy.types.Object, image: bpy.types.Image, user: Any
 
     The user, an image user or a node of the compositor, says which of them is shown.
     """
-    clip, tracked = smoke.smokelift.clip, "matrices" in volume.shown_index(smoke)["scene"]["camera"]
+    clip, tracked = smoke.smokelift.clip, "matrices" in volume.shown(smoke).scene["camera"]
     number = re.search(r"(\d+)\.\w+$", image.filepath)
     if tracked and image.source == "FILE" and number:
         image.source = "SEQUENCE"

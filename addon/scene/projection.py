@@ -14,9 +14,10 @@ from .box import engine_to_world
 from .nodes import Input, Tree, add_node, empty_material, file_group, math_node, number, vector_node
 from .plate import show_plate
 from .smoke import scene_of
-from .volume import frames_before, shown_index
+from .volume import frames_before, shown, shown_take
 
 MATERIAL = "Smokelift Projection"  # name of the material, and of the node group in it
+PLACE = "Smokelift Projection Place"  # name of the group's node in the material
 MARK = "smokelift_projection"  # custom property by which material and group are known under any name
 PROJECTOR = "Smokelift Projector"  # name of the camera that stands where the clip was filmed from
 CARD = "Smokelift Card"  # name of the plane that the plate is projected on
@@ -25,7 +26,7 @@ _INPUTS = (
     Input("Point", "NodeSocketVector", "A point in the space of the camera that filmed"),
     Input("Focal Length", "NodeSocketVector", "Focal length over the width and over the height of the picture"),
     Input("Center", "NodeSocketVector", "Center of the lens in the picture, from 0 to 1"),
-    number("Perspective", "1 for a perspective camera, 0 for an orthographic one"),
+    number("Perspective")("1 for a perspective camera, 0 for an orthographic one"),
 )
 
 CARD_BEHIND = 1.1  # distance of the card from the projector over that of the box's farthest corner
@@ -34,11 +35,11 @@ CARD_WIDTHS = 2.0  # width of the card over the picture's there: room for a came
 
 def project(smoke: bpy.types.Object) -> None:
     """Project the plate of the result on show; a second time changes it and what the artist left as it was."""
-    scene, tables = scene_of(smoke), shown_index(smoke)["scene"]
+    scene, tables = scene_of(smoke), shown(smoke).scene
     scene.render.film_transparent = False
     projector = _projector(smoke, tables["camera"])
     material = _material(projector, tables["camera"])
-    placed = material.node_tree.nodes[f"{MATERIAL} Place"].outputs[0]
+    placed = material.node_tree.nodes[PLACE].outputs[0]
     show_plate(smoke, material.node_tree, material.node_tree.nodes[MATERIAL], lambda: placed)
     if CARD not in scene.objects:
         _add_card(smoke, tables, material)
@@ -73,7 +74,7 @@ def _projector(smoke: bpy.types.Object, table: dict[str, Any]) -> bpy.types.Obje
     if len(poses) == 1:
         set_unless_changed(projector, "place", projector, "matrix_basis", poses[0])
     else:
-        first = smoke.smokelift.clip.frame_start + frames_before(smoke.smokelift, shown_index(smoke))
+        first = smoke.smokelift.clip.frame_start + frames_before(smoke, shown_take(smoke))
         _animate(projector, poses, first)
     return projector
 
@@ -121,7 +122,7 @@ def _material(projector: bpy.types.Object, table: dict[str, Any]) -> bpy.types.M
     material = material or _new_material()
     nodes = material.node_tree.nodes
     nodes[PROJECTOR].object = projector
-    place, (width, height) = nodes[f"{MATERIAL} Place"], table["size"]
+    place, (width, height) = nodes[PLACE], table["size"]
     place.inputs["Focal Length"].default_value = (table["fx"] / width, table["fy"] / height, 0.0)
     # Blender counts the rows of a picture from below
     place.inputs["Center"].default_value = (table["cx"] / width, 1.0 - table["cy"] / height, 0.0)
@@ -134,21 +135,17 @@ def _new_material() -> bpy.types.Material:
     material = empty_material(MATERIAL)
     material[MARK] = True
     tree = material.node_tree
-    output, mix = add_node(tree, "ShaderNodeOutputMaterial", 5, 0), add_node(tree, "ShaderNodeMixShader", 4, 0)
-    rays, clear = add_node(tree, "ShaderNodeLightPath", 3, -2), add_node(tree, "ShaderNodeBsdfTransparent", 3, -1)
-    shader = add_node(tree, "ShaderNodeEmission", 3, 1, name=MATERIAL, label=MATERIAL)
     outputs = {"Vector": "NodeSocketVector", "In Front": "NodeSocketFloat"}
     group = file_group(MATERIAL, "ShaderNodeTree", MARK, _INPUTS, outputs, _build)
-    name = f"{MATERIAL} Place"
-    place = add_node(tree, "ShaderNodeGroup", 1, 1, node_tree=group, name=name, label=name)
-    place.width = 180.0
-    projector = add_node(tree, "ShaderNodeTexCoord", 0, 1, name=PROJECTOR, label=PROJECTOR)
-    tree.links.new(projector.outputs["Object"], place.inputs["Point"])
+    point = add_node(tree, "ShaderNodeTexCoord", 0, 1, name=PROJECTOR).outputs["Object"]
+    place = add_node(tree, "ShaderNodeGroup", 1, 1, node_tree=group, name=PLACE, width=180.0)
+    tree.links.new(point, place.inputs["Point"])
+    shader = add_node(tree, "ShaderNodeEmission", 3, 1, name=MATERIAL)
     tree.links.new(place.outputs["In Front"], shader.inputs["Strength"])
-    tree.links.new(rays.outputs["Is Camera Ray"], mix.inputs[0])
-    tree.links.new(clear.outputs[0], mix.inputs[1])
-    tree.links.new(shader.outputs[0], mix.inputs[2])
-    tree.links.new(mix.outputs[0], output.inputs["Surface"])
+    rays = add_node(tree, "ShaderNodeLightPath", 3, -2).outputs["Is Camera Ray"]
+    clear = add_node(tree, "ShaderNodeBsdfTransparent", 3, -1).outputs[0]
+    mix = add_node(tree, "ShaderNodeMixShader", 4, 0, rays, clear, shader.outputs[0])
+    add_node(tree, "ShaderNodeOutputMaterial", 5, 0, mix.outputs[0])
     material.cycles.emission_sampling = "NONE"
     return material
 

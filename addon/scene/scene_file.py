@@ -13,11 +13,11 @@ from mathutils import Matrix
 
 from ..core import ShotError
 from ..core.contract import IMAGE_SUFFIXES, SIDES
-from .blender import at_frame
+from .blender import absolute, at_frame, file_of
 from .box import box_corners, box_of, domain_table, has_inlet, in_scene, inlet_table, keep_camera_outside
 from .camera import camera_over_frames
 from .clip import clip_table, start_frame
-from .lights import light_tables, require_lights_outside
+from .lights import light_tables
 from .mask import mask_path
 from .plate import background_table
 from .smoke import scene_of
@@ -31,6 +31,16 @@ def footage_tables(smoke: bpy.types.Object, quick: bool = False) -> dict[str, An
         tables["clip"]["mask"] = str(mask)
     background = background_table(smoke)
     return {**tables, "background": background} if background else tables
+
+
+def shot_files(smoke: bpy.types.Object) -> dict[tuple[str, str], Path]:
+    """The files that are chosen for a shot, by the table of its scene file that names them, and their key there."""
+    settings = smoke.smokelift
+    chosen = {("clip", "mask"): settings.mask, ("background", "image"): settings.plate}
+    files = {key: absolute(path) for key, path in chosen.items() if path}
+    if settings.strokes is not None:
+        files["background", "strokes"] = file_of(settings.strokes)
+    return {("clip", "path"): file_of(settings.clip), **files}
 
 
 def shot_tables(smoke: bpy.types.Object, quick: bool = False) -> dict[str, Any]:
@@ -57,13 +67,16 @@ def shot_tables(smoke: bpy.types.Object, quick: bool = False) -> dict[str, Any]:
         if settings.use_medium:
             tables["medium"] = {key: getattr(settings, key) for key in ("extinction", "albedo", "anisotropy")}
         if settings.light_mode == "SCENE":
-            tables["lights"] = light_tables(scene, depsgraph, rotation)
-            require_lights_outside(tables)
+            tables["lights"] = light_tables(scene, depsgraph, rotation, tables.get("domain"))
         if settings.closed:
             tables.setdefault("domain", {})["closed"] = [side for side in SIDES if side in settings.closed]
-    plate = tables.get("background", {}).get("image")
-    if plate is not None and "matrices" in tables.get("camera", {}):
-        _require_moving_plate(Path(plate))
+    if "image" in tables.get("background", {}) and "matrices" in tables.get("camera", {}):
+        plate = Path(tables["background"]["image"])
+        if plate.suffix.lower() in IMAGE_SUFFIXES and not plate.stem[-1].isdigit():
+            raise ShotError(
+                "The camera moves, and one picture cannot show what is behind the smoke all the time: choose a video, "
+                "or the first of a sequence of pictures, with a clean plate for every frame of the clip."
+            )
     return tables
 
 
@@ -77,12 +90,3 @@ def options(smoke: bpy.types.Object) -> list[str]:
     if settings.distance and not has_inlet(smoke):
         words.append(f"--distance={settings.distance:g}")
     return words
-
-
-def _require_moving_plate(plate: Path) -> None:
-    """Refuse a single picture as the clean plate of a moving camera."""
-    if plate.suffix.lower() in IMAGE_SUFFIXES and not plate.stem[-1].isdigit():
-        raise ShotError(
-            "The camera moves, and one picture cannot show what is behind the smoke all the time: choose a video, or "
-            "the first of a sequence of pictures, with a clean plate for every frame of the clip."
-        )

@@ -15,6 +15,7 @@ from . import volume
 from .blender import set_and_remember, set_unless_changed
 from .clip import used_range
 from .compositing import composite, disable_composite
+from .nodes import add_node
 from .plate import show_clip_behind, show_plate, show_plate_behind
 from .projection import project, show_card
 from .smoke import ASSUMED_CAMERA, hide_default_lamp, scene_of, smokes
@@ -62,8 +63,7 @@ def _set_range(scene: bpy.types.Scene, set_value: Callable[[bpy.types.ID, str, A
 
 def set_up(smoke: bpy.types.Object) -> list[str]:
     """Make renders match the clip from the camera, in the ticked parts; returns what to know of it, a sentence each."""
-    settings, scene, index = smoke.smokelift, scene_of(smoke), volume.shown_index(smoke)
-    said = []
+    settings, scene, said = smoke.smokelift, scene_of(smoke), []
     if settings.set_up_plate:
         _disable_other_plates(smoke)  # first: what it gives back may be set up anew
     if settings.set_up_range:
@@ -75,26 +75,7 @@ def set_up(smoke: bpy.types.Object) -> list[str]:
         else:
             show_clip_behind(smoke, scene.camera.data)
     if settings.set_up_light:
-        scene.render.engine = "CYCLES"
-        _sample_for_a_minute(scene)
-        if scene.cycles.use_denoising and not has_denoiser():  # or F12 ends in an error
-            scene.cycles.use_denoising = False
-            said.append(rpt_("Denoise is off, since this Blender has no denoiser: more Max Samples make less noise."))
-        _scatter_as_fitted(scene, index)
-        estimated = settings.light_mode == "ESTIMATE"
-        _estimated_suns(scene, index, index["scene"]["lights"] if estimated else [])
-        if estimated:
-            lamps = [obj.name for obj in scene.objects if _is_estimated(obj) and not obj.data.use_shadow]
-            if lamps:
-                text = "The clip's light is even and casts no shadow: to light smoke from a side, give {:s} a shadow."
-                said.append(rpt_(text).format(", ".join(lamps)))
-            if hide_default_lamp(scene):
-                said.append(rpt_("The lamp of the new file is hidden: the smoke has the clip's light."))
-            lights = (obj for obj in scene.objects if obj.type == "LIGHT" and not obj.hide_render)
-            further = [obj.name for obj in lights if not _is_estimated(obj)]
-            if further:
-                text = "Beside the clip's light the smoke has that of {:s}: hide it from renders for a match."
-                said.append(rpt_(text).format(", ".join(further)))
+        said = _light(scene, volume.shown(smoke).scene, settings.light_mode == "ESTIMATE")
     if settings.set_up_plate:
         {"WORLD": _set_world, "COMPOSITE": composite, "PROJECTION": project}[settings.plate_place](smoke)
     if settings.set_up_colors:
@@ -120,7 +101,7 @@ def assumed_camera(smoke: bpy.types.Object) -> bpy.types.Object | None:
     settings, scene = smoke.smokelift, scene_of(smoke)
     if settings.camera_mode != "ESTIMATE":
         return None
-    table = volume.shown_index(smoke)["scene"]["camera"]
+    table = volume.shown(smoke).scene["camera"]
     camera = settings.assumed_camera
     if camera is None or camera.type != "CAMERA" or camera.name not in scene.objects:
         camera = bpy.data.objects.new(ASSUMED_CAMERA, bpy.data.cameras.new(ASSUMED_CAMERA))
@@ -135,20 +116,39 @@ def assumed_camera(smoke: bpy.types.Object) -> bpy.types.Object | None:
     return camera
 
 
-def _scatter_as_fitted(scene: bpy.types.Scene, index: dict[str, Any]) -> None:
-    """Let light bounce in smoke as often as in the model that the smoke was fitted with; by default it does once."""
-    bounces = BOUNCES if index["scene"]["medium"].get("scattering") == "multiple" else 0
-    set_unless_changed(scene, "volume_bounces", scene.cycles, "volume_bounces", bounces)
-    if scene.cycles.volume_bounces == bounces:  # bounces of all kinds together end a path too
-        scene.cycles.max_bounces = max(scene.cycles.max_bounces, bounces)
+def _light(scene: bpy.types.Scene, fitted: dict[str, Any], estimated: bool) -> list[str]:
+    """Render with Cycles in the light that smoke was fitted in, added if it was estimated; returns what to know of it.
 
-
-def _sample_for_a_minute(scene: bpy.types.Scene) -> None:
-    """Let Cycles end soon, unless the artist chose how many samples it takes."""
-    if scene.cycles.samples == NEW_SAMPLES:
-        scene.cycles.samples = SAMPLES
-        if hasattr(scene.cycles, "volume_biased"):  # null scattering takes four times as many for the same noise
-            scene.cycles.volume_biased = True
+    Light bounces in smoke as often as in the model that it was fitted with; by default it does once.
+    """
+    said, cycles = [], scene.cycles
+    scene.render.engine = "CYCLES"
+    if cycles.samples == NEW_SAMPLES:  # the artist did not choose how many
+        cycles.samples = SAMPLES
+        if hasattr(cycles, "volume_biased"):  # null scattering takes four times as many for the same noise
+            cycles.volume_biased = True
+    if cycles.use_denoising and not has_denoiser():  # or F12 ends in an error
+        cycles.use_denoising = False
+        said.append(rpt_("Denoise is off, since this Blender has no denoiser: more Max Samples make less noise."))
+    bounces = BOUNCES if fitted["medium"].get("scattering") == "multiple" else 0
+    set_unless_changed(scene, "volume_bounces", cycles, "volume_bounces", bounces)
+    if cycles.volume_bounces == bounces:  # bounces of all kinds together end a path too
+        cycles.max_bounces = max(cycles.max_bounces, bounces)
+    _estimated_suns(scene, fitted, fitted["lights"] if estimated else [])
+    if not estimated:
+        return said
+    lamps = [obj.name for obj in scene.objects if _is_estimated(obj) and not obj.data.use_shadow]
+    if lamps:
+        text = "The clip's light is even and casts no shadow: to light smoke from a side, give {:s} a shadow."
+        said.append(rpt_(text).format(", ".join(lamps)))
+    if hide_default_lamp(scene):
+        said.append(rpt_("The lamp of the new file is hidden: the smoke has the clip's light."))
+    lights = (obj for obj in scene.objects if obj.type == "LIGHT" and not obj.hide_render)
+    further = [obj.name for obj in lights if not _is_estimated(obj)]
+    if further:
+        text = "Beside the clip's light the smoke has that of {:s}: hide it from renders for a match."
+        said.append(rpt_(text).format(", ".join(further)))
+    return said
 
 
 def has_denoiser() -> bool:
@@ -160,7 +160,7 @@ def has_denoiser() -> bool:
     return bool(getattr(_cycles, "with_openimagedenoise", True))
 
 
-def _estimated_suns(scene: bpy.types.Scene, index: dict[str, Any], tables: list[dict[str, Any]]) -> None:
+def _estimated_suns(scene: bpy.types.Scene, fitted: dict[str, Any], tables: list[dict[str, Any]]) -> None:
     """The suns that the engine estimated, with shadows if the smoke was fitted with them; none of earlier results."""
     names = [f"{NAME} Light", *(f"{NAME} Light {number}" for number in range(2, len(tables) + 1))][: len(tables)]
     for name, table in zip(names, tables, strict=True):
@@ -171,7 +171,7 @@ def _estimated_suns(scene: bpy.types.Scene, index: dict[str, Any], tables: list[
         strongest = max(table["irradiance"]) or 1.0
         sun.data.energy = strongest
         sun.data.color = [part / strongest for part in table["irradiance"]]
-        sun.data.use_shadow = index["scene"]["medium"].get("scattering") in ("multiple", "single")
+        sun.data.use_shadow = fitted["medium"].get("scattering") in ("multiple", "single")
         sun.rotation_euler = Vector(table["direction"]).to_track_quat("-Z", "Y").to_euler()
     for sun in [each for each in scene.objects if _is_estimated(each) and each.name not in names]:
         bpy.data.objects.remove(sun)
@@ -200,22 +200,16 @@ def _set_world(smoke: bpy.types.Object) -> None:
         scene.world = world
     if world.node_tree is None:  # since 5.0 there always is one
         world.use_nodes = True
-    nodes, links = world.node_tree.nodes, world.node_tree.links
-    output = next((node for node in nodes if node.type == "OUTPUT_WORLD" and node.is_active_output), None)
-    output = output or nodes.new("ShaderNodeOutputWorld")
-    mix = nodes.get(NAME)
+    tree = world.node_tree
+    output = next((node for node in tree.nodes if node.type == "OUTPUT_WORLD" and node.is_active_output), None)
+    output = output or tree.nodes.new("ShaderNodeOutputWorld")
+    mix = tree.nodes.get(NAME)
     if mix is None:
-        mix = nodes.new("ShaderNodeMixShader")
-        mix.name = mix.label = NAME
-        mix.location = output.location - Vector((0.0, 200.0))
+        rays = add_node(tree, "ShaderNodeLightPath", -2, 2, near=output).outputs["Is Camera Ray"]
+        mix = add_node(tree, "ShaderNodeMixShader", 0, 1, rays, near=output, name=NAME)
         if output.inputs["Surface"].links:
-            links.new(output.inputs["Surface"].links[0].from_socket, mix.inputs[1])
-        links.new(mix.outputs[0], output.inputs["Surface"])
-        rays = nodes.new("ShaderNodeLightPath")
-        links.new(rays.outputs["Is Camera Ray"], mix.inputs[0])
-        background = nodes.new("ShaderNodeBackground")
-        links.new(background.outputs[0], mix.inputs[2])
-        for node, left in ((rays, 400.0), (background, 200.0)):
-            node.location = mix.location - Vector((left, 200.0))
-    tree, background = world.node_tree, mix.inputs[2].links[0].from_node
+            tree.links.new(output.inputs["Surface"].links[0].from_socket, mix.inputs[1])
+        tree.links.new(add_node(tree, "ShaderNodeBackground", -1, 2, near=output).outputs[0], mix.inputs[2])
+        tree.links.new(mix.outputs[0], output.inputs["Surface"])
+    background = mix.inputs[2].links[0].from_node
     show_plate(smoke, tree, background, lambda: tree.nodes.new("ShaderNodeTexCoord").outputs["Window"])

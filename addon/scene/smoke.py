@@ -133,10 +133,8 @@ def _untouched(scene: bpy.types.Scene, name: str, kind: str) -> bpy.types.Object
 def hide_default_cube(scene: bpy.types.Scene) -> bool:
     """Hide the cube of a new file, which stands where smoke of an unknown place is put; returns whether it was seen."""
     cube = _untouched(scene, "Cube", "MESH")
-    if cube is None or cube.matrix_basis != Matrix.Identity(4):
-        return False
-    places = {tuple(vertex.co) for vertex in cube.data.vertices}
-    if places != {(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)}:
+    corners = {(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)}
+    if cube is None or cube.matrix_basis != Matrix.Identity(4) or {(*v.co,) for v in cube.data.vertices} != corners:
         return False
     cube.hide_viewport = cube.hide_render = True
     return True
@@ -148,8 +146,8 @@ def hide_default_lamp(scene: bpy.types.Scene) -> bool:
     if lamp is None or lamp.data.type != "POINT" or lamp.data.animation_data:
         return False
     place, power = LAMP_OF_A_NEW_FILE
-    same_place = (lamp.location - Vector(place)).length < 1e-4
-    if not same_place or lamp.data.energy != power or tuple(lamp.data.color) != (1.0, 1.0, 1.0):
+    moved = (lamp.location - Vector(place)).length > 1e-4
+    if moved or lamp.data.energy != power or tuple(lamp.data.color) != (1.0, 1.0, 1.0):
         return False
     lamp.hide_viewport = lamp.hide_render = True
     return True

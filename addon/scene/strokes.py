@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..core import ShotError
-from .blender import absolute
+from .blender import absolute, file_of, relative
 
 SATURATION = 0.25  # fraction of the frame's saturation that is kept below the strokes
 MIN_STROKE = 0.5  # smallest alpha of a stroke, and smallest difference of its channels: twice that of the frame below
@@ -22,11 +22,14 @@ Pixels = npt.NDArray[np.float32]  # red, green, blue and alpha of an image, (pix
 
 def saved_strokes(image: bpy.types.Image, clip: bpy.types.MovieClip) -> Path:
     """The file of the strokes on a clip, with what was painted last; ShotError if it is missing or of another size."""
-    file = absolute(image.filepath, image.library)
+    file = file_of(image)
     try:
         if WRITTEN in image:
             if image.is_dirty or image[WRITTEN] != _time(file):
-                _write(image, file)
+                if image.is_dirty:
+                    image.save()  # or Blender asks for it at its end
+                _save(strokes_in(_pixels(image)), tuple(image.size), file)
+                image[WRITTEN] = _time(file)
         elif image.is_dirty and image.filepath and image.packed_file is None:
             image.save()
     except RuntimeError as error:
@@ -41,11 +44,15 @@ def saved_strokes(image: bpy.types.Image, clip: bpy.types.MovieClip) -> Path:
     return file
 
 
-def new_strokes(file: Path, size: tuple[int, int]) -> bpy.types.Image:
-    """A file without any stroke, as an image."""
-    file.parent.mkdir(parents=True, exist_ok=True)
-    _save(np.zeros((size[0] * size[1], 4), np.float32), size, file)
-    return bpy.data.images.load(str(file))
+def strokes_at(file: Path, size: tuple[int, int]) -> bpy.types.Image:
+    """The image of the strokes in a file; where there is none, it is written without any."""
+    known = file.is_file()
+    if not known:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        _save(np.zeros((size[0] * size[1], 4), np.float32), size, file)
+    image = bpy.data.images.load(str(file), check_existing=known)
+    image.filepath = relative(file)
+    return image
 
 
 def lay_below(image: bpy.types.Image, picture: Path) -> None:
@@ -69,13 +76,6 @@ def strokes_in(values: Pixels) -> Pixels:
     strokes = np.zeros_like(values)
     strokes[painted, colors.argmax(1)[painted]] = strokes[painted, 3] = 1.0
     return strokes
-
-
-def _write(image: bpy.types.Image, file: Path) -> None:
-    if image.is_dirty:
-        image.save()  # or Blender asks for it at its end
-    _save(strokes_in(_pixels(image)), tuple(image.size), file)
-    image[WRITTEN] = _time(file)
 
 
 def _save(values: Pixels, size: tuple[int, int], file: Path) -> None:

@@ -60,7 +60,7 @@ def test_frames_and_completeness(tmp_path) -> None:
         assert (take.read().frames, take.read().complete, take.read().resumable) == (count, complete, not complete)
     for foreign in ("half a fi", '{"format": 1}', '{"frames": [], "complete": true}', "[]", '{"frames": {}}'):
         (take.directory / "sequence.json").write_text(foreign)
-        assert (take.read().index, take.read().frames, take.read().complete) == (None, 0, False)
+        assert (take.read().index, take.read().frames, take.read().complete) == ({}, 0, False)
         assert [found.read().frames for found in takes(tmp_path)] == [0]
 
 

@@ -14,7 +14,7 @@ from addon.core.job import Job
 from addon.core.take import Take, takes
 from addon.result import shot_check, side_job, smoke_takes
 from addon.scene import look, volume
-from addon.scene.lights import sun_irradiance
+from addon.scene.lights import emitted
 from addon.scene.scene_file import shot_tables
 from addon.scene.smoke import activate
 from conftest import rendered, save_image
@@ -263,9 +263,9 @@ def test_everything_that_makes_a_light_stronger_counts(scene) -> None:
     if not hasattr(light, "exposure"):
         pytest.skip("this Blender's lights have no exposure")
     light.exposure = 1.0
-    assert sun_irradiance(light) == pytest.approx([4.0, 4.0, 4.0])
+    assert emitted(light) == pytest.approx([4.0, 4.0, 4.0])
     light.use_temperature, light.temperature = True, 3000.0
-    red, _, blue = sun_irradiance(light)
+    red, _, blue = emitted(light)
     assert red > 4.0 > blue
 
 
