@@ -52,10 +52,6 @@ def test_a_coarser_grid_covers_the_smoke_once(shot, large) -> None:
 
 def test_what_stays_there_stays_here(shot, large) -> None:
     fine = level(shot)
-<<<<<<< HEAD
-    coarser = fine.coarser
-=======
->>>>>>> loop
     density = np.zeros(SHAPE, np.float32)
     density[fine.views.hull] = np.random.default_rng(0).random(np.count_nonzero(fine.views.hull), np.float32)
     np.testing.assert_allclose(fine.changed_on_coarser(density, lambda means: means), density, rtol=1e-5)

@@ -9,20 +9,14 @@ from smokelift import Velocity, estimate_velocity
 from smokelift.baselines.velocity import PaperVelocity
 from smokelift.scene import SIDES, Camera, Domain
 from smokelift.transport import face_shapes
-<<<<<<< HEAD
-from smokelift.velocity import CoarseToFine, DensityPair, ProjectedCG, VelocitySettings, predict_velocity
-=======
 from smokelift.velocity import (
     CoarseToFine,
     DensityPair,
     PicturePair,
     ProjectedCG,
-    Velocity,
     VelocitySettings,
-    estimate_velocity,
     predict_velocity,
 )
->>>>>>> loop
 from smokelift.velocity.coarse_to_fine import ONE_VIEW_SMOOTHNESS
 from smokelift.velocity.estimator import refine
 from smokelift.velocity.optical_flow import correct_by_optical_flow

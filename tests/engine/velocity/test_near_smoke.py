@@ -39,16 +39,8 @@ def test_smoke_is_carried_as_by_the_velocity_of_the_whole_box(speed, conserve) -
 
 def test_velocity_is_right_where_smoke_can_arrive_and_zero_where_none_is() -> None:
     nothing = np.zeros(SHAPE, np.float32)
-<<<<<<< HEAD
-    assert not carry(nothing, flow(1.0), 1.0, 1.0).any()
-    assert not any(component.any() for component in near_smoke(flow(1.0), nothing > 0, 1.0, 1.0).faces)
-=======
     assert not advect_near(nothing, flow(1.0), 1.0, 1.0).any()
     assert not any(component.any() for component in refine_near_smoke(flow(1.0), nothing > 0, 1.0, 1.0).faces)
-
-
-def test_velocity_is_right_where_smoke_can_arrive_and_zero_far_away() -> None:
->>>>>>> loop
     velocity, smoke = flow(1.0), puff() > 0
     whole, near = refine(velocity, SHAPE), refine_near_smoke(velocity, smoke, 1.0, 1.0)
     assert near.voxel_size == 1.0
