@@ -4,8 +4,9 @@ The smooth density of `RoundDepth` is the mean of all smokes that show one pictu
 detail. A plausible smoke shows from every side what the clip shows from the front: not one of its pictures, but the
 distribution of their patches (`texture`). Noise breaks the spindle's symmetry (`detail_noise`). Then, from coarse
 to fine, pictures of the smoke from many azimuths are moved towards that distribution, and the smoke is scaled along
-their rays to follow. The rows of every picture keep the amounts of the smooth density. After each round the cameras'
-pictures have their turn. Smoke carried on from the frame before has the clip's statistics already: one round is enough.
+their rays to follow. The rows of every picture keep the amounts of the smooth density. After each round the smoke is
+sharpened, by as much as its sides lack of the clip's finest detail, and the cameras' pictures have their turn. Smoke
+carried on from the frame before has the clip's statistics already: one round is enough.
 """
 
 from __future__ import annotations
@@ -21,10 +22,11 @@ from scipy import ndimage
 
 from smokelift.density.depth_prior import DepthEstimate, RoundDepth
 from smokelift.density.detail_noise import stretched_noise
+from smokelift.density.lattice_noise import SMALLEST_BLUR
 from smokelift.density.levels import TINY, Level
 from smokelift.density.multiplicative import fit_multiplicative, take_turns
 from smokelift.density.observation import ObservedClip, ViewSet
-from smokelift.density.texture import ClipTexture, Exemplar, Picture, enlarged
+from smokelift.density.texture import ClipTexture, Exemplar, Picture, enlarged, fine_energy
 from smokelift.density.turntable import Turntable, UprightSmoke
 from smokelift.density.wander import Wander
 from smokelift.render import Volume
@@ -65,6 +67,13 @@ GAIN = (np.pi / 2) ** 0.5
 
 STEP_RANGE = (0.3, 3.0)
 """Smallest and largest factor on a ray's smoke in one step."""
+
+SHARPENING = 2.0
+"""Exponent of the smoke's finest octave, over the fraction that its sides lack of the clip's: with 1 they lack more of
+it (docs/experiments/every-view.md)."""
+
+DETAIL_RANGE = (0.5, 2.0)
+"""Smallest and largest detail of the clip, over that of the sides, that is taken for true."""
 
 ROW_RANGE = (0.5, 2.0)
 """Smallest and largest factor that gives a row of a picture the smooth density's amount
@@ -187,12 +196,26 @@ class EveryView:
         for exemplar in exemplars:
             for _ in range(FRESH_ROUNDS if fresh else 1):
                 turned = UprightSmoke.of(table, table.upright(density[part]), (first, second))
-                for _ in range(AZIMUTHS):
-                    self._step(turned, smooth, exemplar, next(azimuths), relaxation)
+                seen = [self._step(turned, smooth, exemplar, next(azimuths), relaxation) for _ in range(AZIMUTHS)]
                 changed = np.zeros(hull.shape, np.float32)
                 np.copyto(changed[part], table.lying(turned.values), where=hull[part])
+                if exemplar.scale == 1:
+                    changed = self._sharpened(changed, exemplar, seen)
                 density = take_turns(cameras, changed, self.level.views.where)
         return density
+
+    def _sharpened(self, density: Volume, exemplar: Exemplar, sides: Sequence[Picture]) -> Volume:
+        """A density whose finest octave is stronger, or weaker, by what its sides lack of the clip's detail.
+
+        Steps along whole rays hardly reach it, and advection smooths it.
+        """
+        energy = fine_energy(sides)
+        if energy == 0:
+            return density
+        lack = float(np.clip(np.sqrt(exemplar.fine_energy / energy), *DETAIL_RANGE)) - 1
+        fine, coarse = (self.level.blurred(density, blur) + TINY for blur in (SMALLEST_BLUR / 2, SMALLEST_BLUR))
+        octave = (fine / coarse) ** np.float32(SHARPENING * self.strength * lack)
+        return self.level.views.volume(octave * self.level.views.where.take(density))
 
     def _step(
         self,
@@ -201,15 +224,18 @@ class EveryView:
         exemplar: Exemplar,
         azimuth: tuple[int, float],
         relaxation: float,
-    ) -> None:
-        """Scale smoke (upright, a part of the domain) along the rays of one azimuth towards the clip's texture."""
+    ) -> Picture:
+        """Scale smoke (upright, a part of the domain) along the rays of one azimuth towards the clip's texture.
+
+        Its picture before that is returned.
+        """
         table, scale = self.texture.turntable, exemplar.scale
         thickness = np.float32(self.level.views.optics.medium.extinction * table.domain.voxel_size)
         turn, degrees = azimuth
         whole, expected = (each.picture(degrees) for each in (now, smooth))
         shown, known = (block_means(thickness * picture, scale) for picture in (whole, expected))
         if not shown.any():
-            return
+            return shown
         wanted = exemplar.towards(shown, turn)
         outline = ndimage.gaussian_filter(known, OUTLINE_BLUR / (scale * self.level.coarseness))
         wanted *= np.clip(outline / (OUTLINE * outline.max()) - 0.5, 0, 1)
@@ -219,6 +245,7 @@ class EveryView:
         step = np.log(np.clip((wanted + faint) / (shown + faint), *STEP_RANGE))
         step = np.float32(relaxation) * isotropic_filter(step)
         now.scale(enlarged(step, scale, table.shape), degrees)
+        return shown
 
     def azimuths(self) -> Iterator[tuple[int, float]]:
         """Numbers and degrees of azimuths that no camera is near to, spread evenly over all frames."""

@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+import scipy.fft
 from numpy.typing import NDArray
 from scipy import ndimage
 
@@ -209,6 +210,23 @@ def _energy(pictures: Sequence[Picture], blur: float) -> float:
     return square / amount
 
 
+def fine_energy(pictures: Sequence[Picture]) -> float:
+    """Mean square of the pictures' finest octave of detail, over the blurred smoke's, as smoke in depth has it.
+
+    The Fourier transform of a picture is a plane through the vertical of the smoke's own. So its waves stand for the
+    more of those in the smoke the farther they are from the vertical (the ramp filter of backprojection: Kak and
+    Slaney, "Principles of Computerized Tomographic Imaging", 1988, ch. 3). 0 for pictures without smoke.
+    """
+    square = amount = 0.0
+    for picture in pictures:
+        fine, coarse = (ndimage.gaussian_filter(picture, blur) for blur in (SMALLEST_BLUR / 2, SMALLEST_BLUR))
+        body = coarse > BODY * coarse.max()
+        waves = scipy.fft.dct((fine - coarse) * body / np.sqrt(np.where(body, coarse, 1)), axis=0, norm="ortho")
+        square += float((np.square(waves).sum(1) * np.arange(len(waves)) / len(waves)).sum(dtype=np.float64))
+        amount += float(coarse[body].sum(dtype=np.float64))
+    return square / amount if amount > 0 else 0.0
+
+
 def _unit_energy(blur: float, width: float) -> float:
     """`_energy` of octaves of unit strength: each is blurred white noise, of which a ray averages independent parts."""
     own = np.array([each * blur for each in NEIGHBORS])
@@ -229,6 +247,8 @@ class Exemplar:
     """What the whole height of the smoke counts as, in units of v."""
     directions: NDArray[np.float32]
     """(bases, n, n): orthonormal; n is the number of a patch's pixels, and one for its height."""
+    fine_energy: float
+    """That of the pictures; see `fine_energy`."""
     quantiles: NDArray[np.float32]
     """(bases, n, knots): of the patches along each direction, ascending."""
 
@@ -256,7 +276,8 @@ class Exemplar:
         directions = directions.astype(np.float32)
         knots = ((np.arange(KNOTS) + 0.5) / KNOTS * every.shape[1]).astype(np.intp)
         quantiles = np.stack([np.sort(basis @ every, axis=1)[:, knots] for basis in directions])
-        return Exemplar(scale, unit, height, directions, np.ascontiguousarray(quantiles, np.float32))
+        energy = fine_energy([block_means(picture, scale) for picture in pictures])
+        return Exemplar(scale, unit, height, directions, energy, np.ascontiguousarray(quantiles, np.float32))
 
     def towards(self, picture: Picture, turn: int) -> Picture:
         """A picture at this scale, its patches moved to the exemplar's quantiles; where they overlap their mean counts.

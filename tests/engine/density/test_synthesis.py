@@ -83,6 +83,19 @@ def test_what_is_known_of_the_side_is_kept(shot) -> None:
     assert place == pytest.approx(smooth, abs=0.6)
 
 
+@pytest.mark.parametrize("factor", [0.5, 1.5])
+def test_smoke_is_sharpened_to_the_detail_of_the_clip(shot, factor) -> None:
+    """Carried smoke of which a clip shows more, or less, detail becomes sharper, or softer; its low pass stays."""
+    views = ViewSet.of(shot.observe(2), shot.optics, 2)
+    detail = DetailedDepth(RoundDepth()).of_clip(shot).estimate(views).detail
+    others = tuple(replace(each, fine_energy=factor**2 * each.fine_energy) for each in detail.texture.exemplars)
+    changed = replace(detail, texture=replace(detail.texture, exemplars=others))
+    smoke = rising(3)[2] * views.hull
+    usual, other = (each.added(smoke, fresh=False) for each in (detail, changed))
+    assert (fine(usual, 0).std() < fine(other, 0).std()) == (factor > 1)
+    np.testing.assert_allclose(*(ndimage.gaussian_filter(each, 4) for each in (usual, other)), atol=0.05 * usual.max())
+
+
 def lobes(scene: Scene, across: int) -> float:
     """How much noise changes the smoke of boxes a sixth as wide as the domain, in logarithms."""
     settings = replace(Settings.preset("draft"), resolution=(across, across, across * 4 // 3))

@@ -11,7 +11,7 @@ from scipy import ndimage
 from smokelift import Camera, Domain, Medium, _core
 from smokelift.density import Observation
 from smokelift.density.observation import eight_bit_plate
-from smokelift.density.texture import SIZE, ClipTexture, Exemplar, enlarged
+from smokelift.density.texture import SIZE, ClipTexture, Exemplar, enlarged, fine_energy
 from smokelift.render import Optics
 from smokelift.transport import block_means
 
@@ -85,6 +85,16 @@ def test_a_smooth_picture_takes_over_the_detail_of_an_exemplar(scale) -> None:
     assert fine(smooth) < 0.4 * fine(like)
     kept = exemplar.towards(like, 0)
     assert np.linalg.norm(kept - like) < 0.5 * np.linalg.norm(like - ndimage.gaussian_filter(like, SIZE / 2))
+
+
+def test_detail_that_stands_counts_and_level_layers_do_not() -> None:
+    """The same from all sides: smoke with layers alone has none across, that with threads has all of it."""
+    body, ripples = np.ones((48, 64), np.float32), 0.2 * np.cos(np.pi * np.arange(64) / 2).astype(np.float32)
+    standing, level = body + ripples[:48, None], body + ripples
+    energies = [fine_energy([picture]) for picture in (standing, body + (standing - body) / 2, level, body)]
+    assert energies[1] == pytest.approx(energies[0] / 4, rel=0.01)
+    assert max(energies[2:]) < 0.05 * energies[0]
+    assert fine_energy([np.zeros((8, 8), np.float32)]) == 0
 
 
 @pytest.mark.parametrize("line", [np.s_[0, 3:9], np.s_[-1, :], np.s_[:, 0], np.s_[7, 7]])

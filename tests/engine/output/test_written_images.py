@@ -7,9 +7,10 @@ from typing import Any, NoReturn
 import numpy as np
 import OpenEXR
 import pytest
+from PIL import Image
 
 from smokelift.footage.clip import Clip
-from smokelift.output.images import eight_bit, write_image, write_video
+from smokelift.output.images import eight_bit, write_image, write_sheet, write_video
 
 
 def test_eight_bit_is_srgb() -> None:
@@ -54,3 +55,16 @@ def test_a_video_that_breaks_off_leaves_nothing(tmp_path) -> None:
     with pytest.raises(RuntimeError):
         write_video(tmp_path / "a.mp4", frames(), 24.0)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_sheet_has_its_tiles_side_by_side_below_one_another(tmp_path) -> None:
+    colors = [[(50 + row, 90 + column, 200) for column in range(3)] for row in range(2)]
+    tiles = [[np.full((6, 10, 3), color, np.uint8) for color in row] for row in colors]
+    write_sheet(tmp_path / "sheet.png", tiles, ["a", "b", "c"], ["first", "second"])
+    sheet = np.asarray(Image.open(tmp_path / "sheet.png"))
+    places = [np.argwhere((sheet == color).all(-1)) for row in colors for color in row]
+    assert all(len(place) == 60 for place in places)
+    tops, lefts = (np.array([place.min(0)[axis] for place in places]).reshape(2, 3) for axis in (0, 1))
+    assert (tops == tops[:, :1]).all() and (lefts == lefts[:1]).all()
+    assert tops[1, 0] > tops[0, 0] + 6 and (np.diff(lefts[0]) >= 10).all()
+    assert tops.max() + 6 <= len(sheet) and lefts.max() + 10 <= sheet.shape[1]
