@@ -76,7 +76,7 @@ def wall(rows: int, columns: int) -> Picture:
     return np.asarray(0.12 * np.clip(gray, 0.05, 4)[..., None] * np.array([1.2, 0.95, 0.8]), np.float32)
 
 
-def backdrop(rows: int, columns: int, color: float | tuple[float, float, float]) -> Picture:
+def of_one_color(rows: int, columns: int, color: float | tuple[float, float, float]) -> Picture:
     """One color everywhere."""
     return np.broadcast_to(np.asarray(color, np.float32), (rows, columns, 3)).copy()
 
@@ -90,7 +90,7 @@ COLORS: dict[str, float | tuple[float, float, float]] = {
 
 PAINTED: dict[str, Callable[[int, int], Picture]] = {
     "planks": planks, "sky": sky, "leaves": leaves, "page": page, "clouds": clouds, "wall": wall,
-    **{name: partial(backdrop, color=color) for name, color in COLORS.items()},
+    **{name: partial(of_one_color, color=color) for name, color in COLORS.items()},
 }  # fmt: skip
 
 PHOTOGRAPHS = {"coffee": "coffee.png", "rocket": "rocket.jpg"}

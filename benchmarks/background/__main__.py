@@ -25,7 +25,7 @@ from benchmarks.measure import Figures, optical_mass, reconstructed, view_figure
 from benchmarks.plates import BRIGHT
 from benchmarks.tables import line, markdown
 from smokelift import Background, Clip, Domain, Frame, Settings
-from smokelift.extraction.backdrop import find_backdrop
+from smokelift.extraction.find_background import find_background
 from smokelift.extraction.matte import matte
 from smokelift.extraction.plate import Plate, known_plate, without_noise_light
 from smokelift.footage.images import Picture, linear_to_srgb
@@ -100,7 +100,7 @@ def plate_row(case: Case, scenes: Sequence[Baked]) -> list[str]:
             plate, _ = known_plate(background, clip)
             clip = without_noise_light(clip, plate.noise).exposed(plate.gain)
         else:
-            found = find_backdrop(clip, None, None)
+            found = find_background(clip, None, None)
             plate, clip = found.plate, found.clip
         seconds += time.process_time() - began
         rows.append(plate_score(clip, plate, background, case.clean(seen)))

@@ -11,7 +11,7 @@ import numpy as np
 
 from benchmarks.baked import Baked, Seen
 from benchmarks.filming import exposed, filmed
-from benchmarks.plates import PAINTED, backdrop
+from benchmarks.plates import PAINTED, of_one_color
 from benchmarks.tables import line, markdown
 from smokelift.checks import UNDETERMINED, Doubles
 from smokelift.extraction.plate import known_plate
@@ -37,10 +37,10 @@ def print_colors(scenes: Sequence[Baked]) -> None:
     shape = smokes[0].shape
     wall = PAINTED["wall"](*shape)
     plates = {
-        "black": backdrop(*shape, 0),
+        "black": of_one_color(*shape, 0),
         "brick wall": wall,
         "sky": PAINTED["clouds"](*shape),
-        "blue sky": backdrop(*shape, (0.25, 0.45, 0.9)),
+        "blue sky": of_one_color(*shape, (0.25, 0.45, 0.9)),
         "lawn": wall * np.array([0.6, 1.4, 0.4], np.float32),
     }
     print(markdown(["light", "smoke", *plates]), flush=True)

@@ -9,7 +9,7 @@ import av
 import numpy as np
 import OpenEXR
 
-from smokelift.extraction.backdrop import find_backdrop
+from smokelift.extraction.find_background import find_background
 from smokelift.extraction.plate import Plate
 from smokelift.footage.clip import Clip
 from smokelift.footage.frame_source import FrameSource, StoredPicture
@@ -179,7 +179,7 @@ def codes_apart(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 def plate_of(clip: Clip) -> Plate:
     """Return the background that is found for a clip whose camera stands still."""
-    return find_backdrop(clip, None, None).plate
+    return find_background(clip, None, None).plate
 
 
 def clear_plate(image: np.ndarray, codes: float = 1.0) -> Plate:

@@ -22,7 +22,7 @@ from smokelift.density.multiplicative import fit_multiplicative
 from smokelift.density.objective import camera_terms
 from smokelift.density.observation import Observation, ViewSet, eight_bit_plate
 from smokelift.extraction.element import extract_element, shows_transmittance, usual_source
-from smokelift.extraction.given_background import backdrop_color, background_picture
+from smokelift.extraction.given_background import background_picture, single_color
 from smokelift.extraction.plate import Plate
 from smokelift.render import Image, Volume, scene_optics
 from smokelift.render.device import products_on_one_thread
@@ -238,7 +238,7 @@ def _with_plate(observation: Observation, scene: CompleteScene) -> Observation:
     if plate is None:
         plate = eight_bit_plate(background_picture(scene, camera), camera.size)
         observation = replace(observation, plate=plate)
-    if observation.element is not None or backdrop_color(plate.image) is not None:
+    if observation.element is not None or single_color(plate.image) is not None:
         return observation
     source = usual_source([(picture, plate)], camera.size)
     if not shows_transmittance(plate.image, source):

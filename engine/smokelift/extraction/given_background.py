@@ -11,7 +11,7 @@ from smokelift.footage.images import Picture, area_average, linear_to_srgb, read
 from smokelift.scene import Background, Camera, Scene, shared_part
 
 ALIKE, MIN_ALIKE_FRACTION = 8 / 255, 0.9
-"""Difference in sRGB values up to which a pixel has a backdrop's color, and smallest fraction of such pixels: the
+"""Difference in sRGB values up to which a pixel has a background's color, and smallest fraction of such pixels: the
 others are a nozzle, a floor, a logo."""
 
 
@@ -79,7 +79,7 @@ def behind(plate: Picture, own: Camera, camera: Camera) -> Picture:
     return area_average(area_average(plate, *own.size)[part], *camera.size)
 
 
-def backdrop_color(plate: Picture) -> Picture | None:
+def single_color(plate: Picture) -> Picture | None:
     """Return the linear color (3,) of a clean plate (rows, columns, 3) of one color; None of any other plate."""
     color = np.asarray(np.median(plate.reshape(-1, 3), axis=0), np.float32)
     alike = (np.abs(linear_to_srgb(plate) - linear_to_srgb(color)) <= ALIKE).all(-1)

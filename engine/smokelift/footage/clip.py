@@ -50,7 +50,7 @@ class Clip:
         What is said of a defect (a truncated file, say), else None.
     lens
         Focal length in millimeters on 35 mm film, if the file says it.
-    backdrop
+    alpha_background
         Linear gray that is shown behind pictures with an alpha channel; None behind opaque ones.
     mask
         What hides a part of the frames, if anything does.
@@ -61,7 +61,7 @@ class Clip:
     ) -> None:
         self.path = path
         self.fps = source.fps if fps is None else float(fps)
-        self.warning, self.lens, self.backdrop = source.warning, source.lens, source.backdrop
+        self.warning, self.lens, self.alpha_background = source.warning, source.lens, source.alpha_background
         self.mask: Mask | None = None
         self._source = source
         self._damaged = lru_cache(maxsize=None)(source.damaged)

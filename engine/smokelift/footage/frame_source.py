@@ -124,7 +124,7 @@ class FrameSource:
     """The video, or one picture for each frame."""
     lens: float | None = None
     """Focal length in millimeters on 35 mm film (of its diagonal, as CIPA DCG-001 defines it), if the file says it."""
-    backdrop: float | None = None
+    alpha_background: float | None = None
     """Linear gray shown behind pictures with an alpha channel; None if they are opaque."""
     _held: Association = "straight"
 
@@ -155,11 +155,11 @@ class FrameSource:
         """Close the file, if one is held open."""
 
     def shown(self, layer: Layer) -> Picture:
-        """Return a picture over the backdrop, or over black if there is none."""
+        """Return a picture over the background that alpha leaves open, or over black if there is none."""
         picture, alpha = layer
-        if alpha is None or not self.backdrop:
+        if alpha is None or not self.alpha_background:
             return picture
-        return picture + (np.float32(1.0) - alpha[..., None]) * np.float32(self.backdrop)
+        return picture + (np.float32(1.0) - alpha[..., None]) * np.float32(self.alpha_background)
 
     def _sound_samples(self, read: Callable[[int], Sample]) -> Iterator[Sample]:
         """Read a few frames spread over all, with smoke and without; damaged ones are left out."""
@@ -168,9 +168,9 @@ class FrameSource:
                 yield read(n)
 
     def _find_matte(self, encoded: Iterable[Picture], decode: Decoder, layers: Iterable[Layer]) -> None:
-        """Find how pictures (rows, columns, rgba) of encoded values hold their colors, then the backdrop of layers."""
+        """Find how pictures (rows, columns, rgba) of encoded values hold their colors, then the layers' background."""
         self._held = association(encoded, decode)
-        self.backdrop = backdrop_of(layers)
+        self.alpha_background = alpha_background_of(layers)
 
     def _set_lens(self, value: object) -> None:
         """Take what a file says of the focal length in millimeters, if it says one."""
@@ -179,7 +179,7 @@ class FrameSource:
             self.lens = focal if FOCAL_LENGTHS[0] <= focal <= FOCAL_LENGTHS[1] else None
 
 
-def backdrop_of(layers: Iterable[Layer]) -> float | None:
+def alpha_background_of(layers: Iterable[Layer]) -> float | None:
     """Return the linear gray to show pictures of a clip over; None if they are opaque.
 
     An alpha channel is the matte of the smoke, whatever stands behind it. Such pictures are shown over a color that is

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from smokelift.extraction.given_background import backdrop_color, background_picture
+from smokelift.extraction.given_background import background_picture, single_color
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import area_average
 from smokelift.output.files import CONTACT_SHEET, ORBIT, PREVIEW, STRIP
@@ -126,7 +126,7 @@ class Preview:
         if absorbs and scene.background.estimated:
             return np.asarray(self.clip.frame(0).mean((0, 1)))
         plate = background_picture(scene)
-        color = plate if plate.ndim == 1 else backdrop_color(plate)
+        color = plate if plate.ndim == 1 else single_color(plate)
         if color is not None:
             return color
         return np.asarray(plate.mean((0, 1)) if absorbs else np.zeros(3), np.float32)

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from smokelift.checks import require_kind
-from smokelift.extraction.backdrop import find_backdrop
 from smokelift.extraction.element import Element, extract_element
+from smokelift.extraction.find_background import find_background
 from smokelift.extraction.hidden_plate import plate_and_source
 from smokelift.extraction.plate import Plate
 from smokelift.footage.clip import Clip
@@ -122,6 +122,6 @@ def extract(clip: Clip, scene: Scene) -> Extraction:
     """
     require_kind(clip, Clip, "clip", 'a Clip (Clip.open("clip.mp4") opens one)')
     require_kind(scene, Scene, "scene", "a Scene (Scene() leaves all open, Scene.load reads a file)")
-    found = find_backdrop(clip, scene.camera, scene.background)
+    found = find_background(clip, scene.camera, scene.background)
     smoky = sample_smoke(found.clip, found.plate).smoky or range(len(clip))
     return Extraction(found.clip, *plate_and_source(found.clip, found.uncut_clip(found.clip), found.plate, smoky))

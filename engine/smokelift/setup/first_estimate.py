@@ -6,10 +6,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.extraction.backdrop import Backdrop, find_backdrop
 from smokelift.extraction.element import shows_transmittance
+from smokelift.extraction.find_background import FoundBackground, find_background
 from smokelift.extraction.fire import HotPixels, fire_color, firelight, hot_pixels, without_fire
-from smokelift.extraction.given_background import backdrop_color
+from smokelift.extraction.given_background import single_color
 from smokelift.extraction.hidden_plate import plate_and_source
 from smokelift.extraction.matte import matte
 from smokelift.extraction.plate import Plate
@@ -92,7 +92,7 @@ class FirstEstimate:
     """
 
     clip: Clip
-    found: Backdrop
+    found: FoundBackground
     plate: Plate
     samples: SmokeSamples
     fire: Fire | None
@@ -103,12 +103,12 @@ class FirstEstimate:
 def first_estimate(
     clip: Clip, camera: Camera | None, background: Background | None, medium: Medium | None = None
 ) -> FirstEstimate:
-    """Estimate what a clip shows; other parameters and errors as of `find_backdrop`.
+    """Estimate what a clip shows; other parameters and errors as of `find_background`.
 
     Where the ``medium`` that is given has a color of its flame there is fire, however little of it is certain.
     """
     flame_color = None if medium is None else medium.flame_color
-    found = find_backdrop(clip, camera, background)
+    found = find_background(clip, camera, background)
     clip, plate = found.clip, found.plate
     samples = sample_smoke(clip, plate)
     fire, hot = None, hot_pixels(samples.colors, samples.behind)
@@ -125,7 +125,9 @@ def first_estimate(
     return FirstEstimate(clip, found, plate, samples, fire, hot, source)
 
 
-def with_source(found: Backdrop, clip: Clip, samples: SmokeSamples) -> tuple[Plate, Picture | None, SmokeSamples]:
+def with_source(
+    found: FoundBackground, clip: Clip, samples: SmokeSamples
+) -> tuple[Plate, Picture | None, SmokeSamples]:
     """Return the plate of a clip, found in turn with its smoke, the usual source radiance (3,) of that, and samples.
 
     There is none before what does not show T: black, one color, or a given picture as good as one; and without smoke.
@@ -135,7 +137,7 @@ def with_source(found: Backdrop, clip: Clip, samples: SmokeSamples) -> tuple[Pla
         return found.plate, None, samples
     # a wall that was found is no even color, however little its light changes
     shown = visible_plate(found.plate, clip, samples.smoky[0])
-    if found.source != "picture" and backdrop_color(shown) is not None:
+    if found.source != "picture" and single_color(shown) is not None:
         return found.plate, None, samples
     plate, source = plate_and_source(clip, found.uncut_clip(clip), found.plate, samples.smoky)
     if not shows_transmittance(visible_plate(plate, clip, samples.smoky[0]), source):

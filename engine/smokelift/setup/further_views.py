@@ -14,11 +14,11 @@ import numpy as np
 from smokelift.checks import Array, Figures, Finding
 from smokelift.density import ViewSet
 from smokelift.density.hull import agreement
-from smokelift.extraction.backdrop import find_backdrop
+from smokelift.extraction.find_background import find_background
 from smokelift.footage.clip import Clip
 from smokelift.footage.image_sequence import is_video
 from smokelift.scene import ClipSource, CompleteScene
-from smokelift.setup.backdrop_findings import backdrop_findings
+from smokelift.setup.background_findings import background_findings
 from smokelift.setup.coarse import SCATTERING_TOLERANCE, HeldOut, coarse_frames, held_out
 from smokelift.setup.first_estimate import sample_smoke, with_source
 from smokelift.setup.geometry import fitting
@@ -89,7 +89,7 @@ def _open_view(number: int, clip: Clip, scene: CompleteScene) -> tuple[ShotView,
     camera, background = fitting(view.camera, view_clip), view.background
     if background is None and scene.background.color is not None:
         background = replace(scene.background, strokes=None)
-    found = find_backdrop(view_clip, camera, background)
+    found = find_background(view_clip, camera, background)
     try:
         plate, source, _ = with_source(found, found.clip, sample_smoke(found.clip, found.plate))
         shown = replace(ShotView.facing(scene.domain, found.clip, camera, plate), source=source)
@@ -99,7 +99,7 @@ def _open_view(number: int, clip: Clip, scene: CompleteScene) -> tuple[ShotView,
     angle = np.degrees(np.arccos(np.clip(axes[0] @ axes[1], -1, 1)))
     first, last = view_clip.numbers[0], view_clip.numbers[-1]
     which: Figures = {"name": view_clip.path.name, "degrees": float(angle), "first": first, "last": last}
-    said = (*view_clip.findings(), Finding("further view", which), *backdrop_findings(found))
+    said = (*view_clip.findings(), Finding("further view", which), *background_findings(found))
     return shown, [replace(each, figures={**each.figures, "view": number + 1}) for each in said]
 
 

@@ -13,7 +13,7 @@ from smokelift.density import AxisEstimate, clip_axis
 from smokelift.footage.clip import Clip
 from smokelift.render import Image, scene_optics
 from smokelift.scene import SHADOWED, Background, CompleteScene, Domain, Scattering, Scene
-from smokelift.setup.backdrop_findings import first_findings
+from smokelift.setup.background_findings import first_findings
 from smokelift.setup.coarse import coarse_frame, coarse_frames
 from smokelift.setup.first_estimate import FirstEstimate, first_estimate
 from smokelift.setup.further_views import disagreement, open_views

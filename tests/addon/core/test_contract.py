@@ -20,7 +20,7 @@ from smokelift.app.commands import directed
 from smokelift.checks import Source
 from smokelift.direct import new_sequence
 from smokelift.direct.retiming import playback
-from smokelift.extraction.backdrop import MOVING_CAMERA
+from smokelift.extraction.find_background import MOVING_CAMERA
 from smokelift.footage.frame_source import ClipError
 from smokelift.footage.image_sequence import numbered_files
 from smokelift.footage.images import READABLE

@@ -9,8 +9,8 @@ import pytest
 from scipy import ndimage
 
 from smokelift import Background, Clip
-from smokelift.extraction.backdrop import find_backdrop
 from smokelift.extraction.camera_motion import CameraMotion, find_motion
+from smokelift.extraction.find_background import find_background
 from smokelift.extraction.proxy import Proxy
 from smokelift.footage.images import srgb_to_linear
 from smokelift.footage.registration import Similarity, corners
@@ -177,35 +177,35 @@ def test_a_camera_that_moves_after_it_stood_is_registered(tmp_path) -> None:
     motions = shifts(2 * way, 6 * way)
     whole = clip_of_puff(tmp_path, motions)
     for clip in (whole, whole.part(16, 22)):
-        backdrop = find_backdrop(clip, None, None)
-        plate = backdrop.plate.at(0)
-        truth = srgb_to_linear(seen_at(wall(), motions[backdrop.motion.reference]))[..., None].repeat(3, -1)
+        background = find_background(clip, None, None)
+        plate = background.plate.at(0)
+        truth = srgb_to_linear(seen_at(wall(), motions[background.motion.reference]))[..., None].repeat(3, -1)
         assert np.percentile(codes_apart(plate.image, truth)[inner], 95) < 12
         last = len(clip) - 1
-        shown, seen = backdrop.clip.frame(last), clip.registered(lambda *_: motions[-1]).seen(0, *clip.size)
+        shown, seen = background.clip.frame(last), clip.registered(lambda *_: motions[-1]).seen(0, *clip.size)
         assert codes_apart(shown, truth)[inner].mean() < 4
         assert 0.9 < seen.mean() < 1
 
 
 def test_a_clip_that_stands_still_stays_as_it_is(tmp_path) -> None:
     with clip_of_puff(tmp_path, STILL * 2) as clip:
-        backdrop = find_backdrop(clip, None, None)
-        assert backdrop.motion is None
-        np.testing.assert_array_equal(backdrop.clip.frame(3), clip.frame(3))
+        background = find_background(clip, None, None)
+        assert background.motion is None
+        np.testing.assert_array_equal(background.clip.frame(3), clip.frame(3))
 
 
 @pytest.mark.parametrize("frame", [None, (0,)], ids=["picture", "frame of the clip"])
 def test_a_clip_is_registered_to_a_plate_that_it_does_not_lie_on(tmp_path, frame) -> None:
     with clip_of_puff(tmp_path, shifts(NONE - 3, NONE + 4) if frame is None else shifts(*SHAKE)) as clip:
-        backdrop = find_backdrop(clip, None, Background(frame=frame) if frame else plate_picture(tmp_path))
-        assert backdrop.motion.reference is None
+        background = find_background(clip, None, Background(frame=frame) if frame else plate_picture(tmp_path))
+        assert background.motion.reference is None
         if frame is None:
-            assert backdrop.motion.reach(*SIZE[::-1]) == pytest.approx(5, abs=0.3)
-        off = codes_apart(backdrop.clip.frame(5 if frame else 0), backdrop.plate.image)
+            assert background.motion.reach(*SIZE[::-1]) == pytest.approx(5, abs=0.3)
+        off = codes_apart(background.clip.frame(5 if frame else 0), background.plate.image)
         assert off[10 : SIZE[0] // 3, 10:-10].mean() < 4
 
 
 def test_a_plate_of_another_place_is_refused(tmp_path) -> None:
     clip = clip_of_puff(tmp_path, shifts(NONE, NONE + 30))
     with clip, pytest.raises(ValueError, match="does not lie on the clip"):
-        find_backdrop(clip, None, plate_picture(tmp_path))
+        find_background(clip, None, plate_picture(tmp_path))

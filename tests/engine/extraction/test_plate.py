@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from smokelift import Background, Clip
-from smokelift.extraction.backdrop import find_backdrop
+from smokelift.extraction.find_background import find_background
 from smokelift.extraction.matte import matte
 from smokelift.extraction.plate import FINEST, finest_detail, known_plate, without_noise_light
 from smokelift.footage.images import srgb_to_linear
@@ -103,7 +103,7 @@ def test_every_frame_gets_the_exposure_of_its_background(tmp_path) -> None:
     clip = film(tmp_path, truth, puff, 0.6)
     changing = clip.changed(lambda n, picture: picture * (1.5 if n == 4 else 1.0 if n < COUNT // 2 else 0.7))
     _, even = known_plate(truth, changing)
-    found = find_backdrop(changing, None, None)
+    found = find_background(changing, None, None)
     for n, gain in ((4, 1.5), (8, 1.0), (20, 0.7)):
         assert np.median(codes_apart(even.frame(n), clip.frame(n))) < 1.5
         np.testing.assert_allclose(even.gain(n), gain, rtol=0.02)
@@ -130,7 +130,7 @@ def test_a_coarse_codec_keeps_coarse_detail_alone(monkeypatch, quantizer, finest
 @pytest.mark.parametrize("how", ["picture", "frame", "color", "found"])
 def test_a_codec_tells_of_given_pictures_alone(tmp_path, monkeypatch, how) -> None:
     """One color has no detail, and a plate that many frames show has lost what they have."""
-    monkeypatch.setattr("smokelift.extraction.backdrop.finest_detail", lambda clip: 5.0)
+    monkeypatch.setattr("smokelift.extraction.find_background.finest_detail", lambda clip: 5.0)
     behind = wall(0.1, 0.5)
     write_image(tmp_path / "wall.png", behind)
     given = {
@@ -139,5 +139,5 @@ def test_a_codec_tells_of_given_pictures_alone(tmp_path, monkeypatch, how) -> No
         "color": Background(color=(0.1, 0.1, 0.1)),
         "found": None,
     }[how]
-    plate = find_backdrop(film(tmp_path, behind, puff, 0.6), None, given).plate
+    plate = find_background(film(tmp_path, behind, puff, 0.6), None, given).plate
     assert plate.finest == (5.0 if how in ("picture", "frame") else FINEST)

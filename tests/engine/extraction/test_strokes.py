@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 from smokelift import Background, Clip
-from smokelift.extraction.backdrop import Backdrop, find_backdrop
+from smokelift.extraction.find_background import FoundBackground, find_background
 from smokelift.extraction.matte import matte
 from smokelift.extraction.plate import Plate
 from smokelift.footage.frame_source import ClipError
@@ -32,12 +32,12 @@ def strokes(folder: Path, *painted: tuple[np.ndarray, tuple[int, ...]]) -> Path:
     return folder / "strokes.png"
 
 
-def painted(clip: Clip, *lines: tuple[np.ndarray, tuple[int, ...]], **given: object) -> tuple[Backdrop, Plate]:
-    found = find_backdrop(clip, None, Background(strokes=strokes(clip.path.parent, *lines), **given))
+def painted(clip: Clip, *lines: tuple[np.ndarray, tuple[int, ...]], **given: object) -> tuple[FoundBackground, Plate]:
+    found = find_background(clip, None, Background(strokes=strokes(clip.path.parent, *lines), **given))
     return found, found.plate
 
 
-def opacity_errors(found: Backdrop, smoke: np.ndarray, truth: np.ndarray, number: int = 12) -> float:
+def opacity_errors(found: FoundBackground, smoke: np.ndarray, truth: np.ndarray, number: int = 12) -> float:
     """The root mean square error of the opacity of white smoke, by what it changes of the plate that was found."""
     plate = found.plate.at(number).image
     shown = ((found.clip.frame(number) - plate) / (1 - plate)).mean(-1)
@@ -47,7 +47,7 @@ def opacity_errors(found: Backdrop, smoke: np.ndarray, truth: np.ndarray, number
 def test_one_green_stroke_finds_smoke_that_stands_still(tmp_path) -> None:
     """Without it the plume is the plate's, and none of the smoke is found."""
     clip, there = film(tmp_path, GRADIENT, lambda _: PLUME, 1.0), PLUME > 0
-    without = find_backdrop(clip, None, None)
+    without = find_background(clip, None, None)
     found, plate = painted(clip, (there, GREEN))
     assert opacity_errors(without, PLUME, there) > 0.4
     assert opacity_errors(found, PLUME, there) < 0.01
@@ -59,7 +59,7 @@ def test_one_green_stroke_finds_smoke_that_stands_still(tmp_path) -> None:
     assert matte(found.clip.frame(5), plate).mask[thick].all()
     with Image.open(tmp_path / "strokes.png") as picture:  # of another size
         picture.resize((WIDTH * 3, HEIGHT * 3)).save(tmp_path / "strokes.png")
-    scaled = find_backdrop(clip, None, Background(strokes=tmp_path / "strokes.png"))
+    scaled = find_background(clip, None, Background(strokes=tmp_path / "strokes.png"))
     np.testing.assert_array_equal(scaled.plate.confidence, plate.confidence)
 
 
@@ -77,7 +77,7 @@ def test_nothing_that_is_painted_red_is_smoke(tmp_path) -> None:
     assert (plate.confidence[box] == 1).all()
     median = np.median([steady.frame(number) for number in steady.spread(15)], axis=0)
     assert codes_apart(plate.image, median)[box].max() < 5
-    without = find_backdrop(clip, None, None)
+    without = find_background(clip, None, None)
     for number in (3, 12):
         masks = [matte(each.clip.frame(number), each.plate.at(0)).mask for each in (found, without)]
         assert not masks[0][box].any() and masks[1][box].any()
@@ -153,12 +153,12 @@ def test_strokes_that_say_nothing_are_refused(tmp_path) -> None:
         with Image.open(file) as picture:
             picture.resize((WIDTH * width, HEIGHT)).save(file)
         with pytest.raises(ClipError, match=said):
-            find_backdrop(clip, None, Background(strokes=file))
+            find_background(clip, None, Background(strokes=file))
     everywhere = strokes(tmp_path, (ROWS >= 0, GREEN))
     write_image(tmp_path / "plate.png", GRADIENT)
     with pytest.raises(ClipError, match="nothing that is not smoke"):
-        find_backdrop(clip, None, Background(image=tmp_path / "plate.png", strokes=everywhere))
+        find_background(clip, None, Background(image=tmp_path / "plate.png", strokes=everywhere))
     with pytest.raises(ImageError, match="no such file"):
-        find_backdrop(clip, None, Background(strokes=tmp_path / "no.png"))
+        find_background(clip, None, Background(strokes=tmp_path / "no.png"))
     with pytest.raises(ValueError, match="one frame"):
-        find_backdrop(clip, None, Background(image=clip.path, strokes=strokes(tmp_path, (PLUME > 0, GREEN))))
+        find_background(clip, None, Background(image=clip.path, strokes=strokes(tmp_path, (PLUME > 0, GREEN))))

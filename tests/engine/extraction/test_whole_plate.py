@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from smokelift.extraction.backdrop import find_backdrop
+from smokelift.extraction.find_background import find_background
 from smokelift.extraction.plate import Plate
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import linear_to_srgb, srgb_to_linear
@@ -43,9 +43,9 @@ def wall() -> np.ndarray:
 
 
 def found(clip: Clip) -> Plate:
-    backdrop = find_backdrop(clip, None, None)
-    assert backdrop.source == "picture"
-    return backdrop.plate
+    background = find_background(clip, None, None)
+    assert background.source == "picture"
+    return background.plate
 
 
 @pytest.mark.parametrize(

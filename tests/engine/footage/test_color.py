@@ -80,10 +80,10 @@ def written(folder: Path, kind: str, pictures: list[np.ndarray]) -> Path:
 def test_smoke_is_as_bright_however_a_program_held_it(tmp_path, kind, held, gray) -> None:
     path = written(tmp_path, kind, [stored(held, n, gray) for n in range(COUNT)])
     with Clip.open(path, fps=24) as clip:
-        assert clip.backdrop == float(gray < 0.2)
+        assert clip.alpha_background == float(gray < 0.2)
         for n in range(COUNT):
             alpha = opacity(n)
-            shown = gray * TINT * alpha + (1 - alpha) * clip.backdrop
+            shown = gray * TINT * alpha + (1 - alpha) * clip.alpha_background
             np.testing.assert_allclose(clip.frame(n), shown, atol=0.012)
         assert [note.figures.get("held") for note in clip.findings()] == ([] if held == STRAIGHT else [held])
 
@@ -111,6 +111,6 @@ def test_an_exr_is_premultiplied_in_linear_light_as_its_format_says(tmp_path) ->
     for n in range(COUNT):
         write_exr(tmp_path / f"a{n}.exr", {"RGBA": stored(IN_CODES, n, 0.715).astype(np.float32)})
     with Clip.open(tmp_path / "a#.exr", fps=24) as clip:
-        assert clip.backdrop == 0
+        assert clip.alpha_background == 0
         np.testing.assert_allclose(clip.frame(2), stored(IN_CODES, 2, 0.715)[..., :3], rtol=1e-5)
         assert clip.findings() == ()

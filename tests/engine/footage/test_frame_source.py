@@ -5,8 +5,8 @@ import pytest
 from PIL import Image
 
 from smokelift import Background, Clip
-from smokelift.extraction.backdrop import find_backdrop
-from smokelift.footage.frame_source import FrameSource, Layer, StoredPicture, backdrop_of
+from smokelift.extraction.find_background import find_background
+from smokelift.footage.frame_source import FrameSource, Layer, StoredPicture, alpha_background_of
 from smokelift.footage.images import area_average, code_values, linear_to_srgb, srgb_to_linear
 from tests.engine.films import encode
 
@@ -36,17 +36,17 @@ def layer(gray: float, alpha: float | None) -> Layer:
     return picture, None if alpha is None else opacity
 
 
-@pytest.mark.parametrize(("gray", "backdrop"), [(0.05, 1.0), (0.9, 0.0)])
-def test_dark_smoke_stands_before_white_and_bright_smoke_before_black(gray, backdrop) -> None:
+@pytest.mark.parametrize(("gray", "background"), [(0.05, 1.0), (0.9, 0.0)])
+def test_dark_smoke_stands_before_white_and_bright_smoke_before_black(gray, background) -> None:
     clip = [layer(gray, 0.0), layer(gray, 0.5)]
     source = FrameSource()
-    source.backdrop = backdrop_of(clip)
-    assert source.backdrop == backdrop
+    source.alpha_background = alpha_background_of(clip)
+    assert source.alpha_background == background
     shown = source.shown(clip[1])
-    np.testing.assert_allclose(shown[0, [0, 5]], [[0.5 * gray + 0.5 * backdrop] * 3, [backdrop] * 3], rtol=1e-6)
+    np.testing.assert_allclose(shown[0, [0, 5]], [[0.5 * gray + 0.5 * background] * 3, [background] * 3], rtol=1e-6)
 
 
-def test_the_backdrop_is_the_background_and_nothing_is_estimated(tmp_path) -> None:
+def test_the_background_of_alpha_is_taken_and_nothing_is_estimated(tmp_path) -> None:
     for n in range(4):
         codes = np.full((24, 32, 4), 40, np.uint8)
         codes[..., 3] = 0
@@ -56,7 +56,7 @@ def test_the_backdrop_is_the_background_and_nothing_is_estimated(tmp_path) -> No
         half = 128 / 255
         np.testing.assert_allclose(clip.frame(3)[20, 15], srgb_to_linear(40 / 255) * half + 1 - half, rtol=1e-5)
         for given in (None, Background(color=(0.0, 0.0, 0.0)), Background(strokes=tmp_path / "no.png")):
-            found = find_backdrop(clip, None, given)
+            found = find_background(clip, None, given)
             assert found.background == Background(color=(1.0, 1.0, 1.0))
             assert (found.plate.at(2).image == 1).all()
             assert (found.source, found.strokes) == ("alpha", None)

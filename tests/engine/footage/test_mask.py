@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 from smokelift import Background, Clip
-from smokelift.extraction.backdrop import find_backdrop
+from smokelift.extraction.find_background import find_background
 from smokelift.extraction.plate import Plate, cleared, known_plate, uncovered
 from smokelift.footage.frame_source import ClipError
 from smokelift.footage.images import ImageError
@@ -161,7 +161,7 @@ def test_what_is_hidden_all_the_time_is_shown_as_it_was_filmed(tmp_path, mask, d
         assert middle == pytest.approx(1 + drift / 2, abs=0.05)
         assert codes_apart(found.image / middle, wall(0.3, 0.5)).max() < 5
         assert found.confidence[:, SIDE + 4 :].mean() > 0.9
-        given = find_backdrop(clip, None, Background(color=(0.1, 0.1, 0.1))).plate.at(0)
+        given = find_background(clip, None, Background(color=(0.1, 0.1, 0.1))).plate.at(0)
         np.testing.assert_allclose(given.image, 0.1, atol=1e-6)
     with Clip.open(file) as clip:
         assert uncovered(found, clip) is found
@@ -174,7 +174,7 @@ def test_what_a_tight_mask_hides_is_still_background(tmp_path) -> None:
     smoky = np.mean([puff(12 + 0.3 * np.sin(n)) for n in range(COUNT)], 0) > 0.1
     write_image(tmp_path / "mask.png", np.repeat(smoky[..., None], 3, 2).astype(np.float32))
     with Clip.open(tmp_path / "frame_###.png", mask=tmp_path / "mask.png") as clip:
-        found = find_backdrop(clip, None, None)
+        found = find_background(clip, None, None)
     assert found.source == "picture"
     plate = found.plate.at(0)
     assert plate.confidence.mean() > 0.5

@@ -5,7 +5,7 @@ from functools import partial
 import numpy as np
 
 from smokelift.checks import Finding
-from smokelift.extraction.backdrop import Backdrop, find_backdrop
+from smokelift.extraction.find_background import FoundBackground, find_background
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import area_average
 from smokelift.footage.video import median_quantizer
@@ -35,7 +35,7 @@ MIN_COARSE_QUANTIZER = 42.0
 def first_findings(estimate: FirstEstimate, given: bool) -> list[Finding]:
     """Return what was assumed or noticed of a clip and its background, which may be ``given``; with the doubts."""
     found, samples, hot = estimate.found, estimate.samples, estimate.hot
-    said = backdrop_findings(found, not given and _between_bars(samples))
+    said = background_findings(found, not given and _between_bars(samples))
     if found.source == "alpha" and given:
         said.append(Finding("background unused"))
     said += doubts(found, samples, given)
@@ -48,9 +48,9 @@ def first_findings(estimate: FirstEstimate, given: bool) -> list[Finding]:
     return said
 
 
-def backdrop_findings(found: Backdrop, bars: bool = False) -> list[Finding]:
+def background_findings(found: FoundBackground, bars: bool = False) -> list[Finding]:
     """Return how a background was found, and what stands before it if it has one color, not that of ``bars``."""
-    said = _background_findings(found, bars)
+    said = _how_found(found, bars)
     if found.motion is not None:
         figures: dict[str, float] = {"pixels": found.motion.reach(*found.clip.size)}
         if found.motion.reference is None:
@@ -63,12 +63,12 @@ def backdrop_findings(found: Backdrop, bars: bool = False) -> list[Finding]:
     return said
 
 
-def _background_findings(found: Backdrop, bars: bool) -> list[Finding]:
+def _how_found(found: FoundBackground, bars: bool) -> list[Finding]:
     """What is behind the smoke; nothing if it is given."""
     clip, plate = found.clip, found.plate
     background = partial(Finding, about="background", source="estimated")
     if found.source == "alpha":
-        return [background("alpha channel", {"behind": "white" if clip.backdrop else "black"})]
+        return [background("alpha channel", {"behind": "white" if clip.alpha_background else "black"})]
     if found.source == "given":
         return []
     if found.source == "picture":
@@ -91,7 +91,7 @@ def _background_findings(found: Backdrop, bars: bool) -> list[Finding]:
     return [background("background of one color", figures), *objects]
 
 
-def doubts(found: Backdrop, samples: SmokeSamples, given: bool) -> list[Finding]:
+def doubts(found: FoundBackground, samples: SmokeSamples, given: bool) -> list[Finding]:
     """Return why the result may be empty or wrong; ``given`` if the scene says the background."""
     clip, doubt = found.clip, partial(Finding, doubt=True)
     said = []
@@ -129,7 +129,7 @@ def what_helps(clip: Clip, given: bool) -> Finding:
         return Finding("smoke behind the mask", doubt=True)
     if given:
         return Finding("no smoke before the given background", doubt=True)
-    if len(clip) == 1 and clip.backdrop is None:
+    if len(clip) == 1 and clip.alpha_background is None:
         return Finding("no smoke in one frame", doubt=True)
     return Finding("no smoke before an estimated background", doubt=True)
 
@@ -137,7 +137,7 @@ def what_helps(clip: Clip, given: bool) -> Finding:
 def _shows_smoke(clip: Clip) -> bool:
     """Whether smoke is found in a clip of which nothing is given; not if its camera moves."""
     try:
-        found = find_backdrop(clip, None, None)
+        found = find_background(clip, None, None)
     except ValueError:
         return False
     return bool(sample_smoke(found.clip, found.plate).smoky)

@@ -8,8 +8,8 @@ import pytest
 from scipy import ndimage
 
 from smokelift import Camera, Clip
-from smokelift.extraction.backdrop import Backdrop, find_backdrop
 from smokelift.extraction.background_kind import color_around
+from smokelift.extraction.find_background import FoundBackground, find_background
 from smokelift.extraction.matte import matte
 from smokelift.footage.images import srgb_to_linear
 from smokelift.output.images import write_image
@@ -54,7 +54,7 @@ def fog(folder: Path, frames: tuple[int, int] | None = None, haze: float | None 
 def test_fog_that_fills_black_is_no_noise(tmp_path, how, source) -> None:
     """Most of its light is in the matte, also where no pixel is ever clear."""
     with fog(tmp_path, **how) as clip:
-        found = find_backdrop(clip, None, None)
+        found = find_background(clip, None, None)
         assert found.source == source
         plate = found.plate.at(0)
         if source == "color":
@@ -71,7 +71,7 @@ def test_faint_fog_before_one_color_is_no_noise(tmp_path) -> None:
     fog = (6 * np.clip(np.sin(rows / 9 + n / 2) * np.sin(columns / 11 - n / 3), 0, 1) for n in range(COUNT))
     faint = ((60 + each + random.normal(0, 1, rows.shape)) / 255 for each in fog)
     with clip_of(tmp_path, (srgb_to_linear(each) for each in faint)) as clip:
-        found = find_backdrop(clip, None, None)
+        found = find_background(clip, None, None)
     assert found.source == "color"
     assert found.plate.noise.lasting.max() * 255 < 1.3
 
@@ -94,7 +94,7 @@ def test_what_follows_a_cut_is_not_behind_the_smoke(tmp_path) -> None:
         shown = np.kron(random.uniform(0, 0.6, (HEIGHT // 8, WIDTH // 8, 3)), np.ones((8, 8, 1)))
         write_image(tmp_path / f"frame_{n:03d}.png", srgb_to_linear(shown))
     clip = Clip.open(tmp_path / "frame_###.png", fps=24, frames=(4, 8))
-    found = find_backdrop(clip, None, None)
+    found = find_background(clip, None, None)
     assert found.uncut_span == (0, 13)
     assert np.percentile(codes_apart(found.plate.at(0).image, truth), 95) < 8
 
@@ -148,10 +148,10 @@ def test_what_has_edges_is_no_mist(tmp_path, lit) -> None:
     assert plate.image[middle].min() > 0
 
 
-def moving(clip: Clip) -> Backdrop:
+def moving(clip: Clip) -> FoundBackground:
     """What is found behind a camera that is known to move."""
     cameras = [Camera.look_at((0, -3, 0.01 * n), (0, 0, 0), fov_y_degrees=40, size=clip.size) for n in range(COUNT)]
-    return find_backdrop(clip, replace(cameras[0], matrices=tuple(each.matrix for each in cameras)), None)
+    return find_background(clip, replace(cameras[0], matrices=tuple(each.matrix for each in cameras)), None)
 
 
 @pytest.mark.parametrize("color", [(0.0, 0.0, 0.0), (0.1, 0.3, 0.05)], ids=["black", "green"])

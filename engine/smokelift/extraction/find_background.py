@@ -51,7 +51,7 @@ Source = Literal["alpha", "given", "color", "color around one frame", "black for
 
 
 @dataclass(frozen=True, eq=False)
-class Backdrop:
+class FoundBackground:
     """What stands behind the smoke of a clip."""
 
     source: Source
@@ -80,14 +80,14 @@ class Backdrop:
         return clip if self.uncut_span is None else clip.part(*self.uncut_span)
 
 
-def find_backdrop(clip: Clip, camera: Camera | None, background: Background | None) -> Backdrop:
+def find_background(clip: Clip, camera: Camera | None, background: Background | None) -> FoundBackground:
     """Find what stands behind the smoke of a clip, given what the scene says of it.
 
     ClipError or ImageError is raised if a frame or a picture cannot be read, ValueError if the camera moves, other
     than a similarity of the picture mends, and the background is neither given for every frame nor of one color, or
     strokes are given.
     """
-    gray = None if clip.backdrop is None else Background(color=(clip.backdrop,) * 3)
+    gray = None if clip.alpha_background is None else Background(color=(clip.alpha_background,) * 3)
     said, moves = gray or background or Background(), camera is not None and camera.moves
     frames = said.frame
     if moves and frames:
@@ -111,7 +111,7 @@ def find_backdrop(clip: Clip, camera: Camera | None, background: Background | No
         if said.color is None:
             # one that many frames show has lost as much detail to the codec as they have; one color has none
             plate = replace(plate, finest=finest_detail(clip))
-        found = Backdrop("alpha" if gray else "given", shown, plate, said, motion=motion)
+        found = FoundBackground("alpha" if gray else "given", shown, plate, said, motion=motion)
     plate = uncovered(found.plate, found.clip) if found.source == "picture" else found.plate
     found = replace(found, clip=cleared(found.clip, plate), plate=plate)
     if strokes is None:
@@ -143,7 +143,7 @@ def _on_plate(clip: Clip, plate: Picture | Clip | None) -> tuple[Clip, CameraMot
     return (clip, None) if motion is None else (clip.registered(motion.at), motion)
 
 
-def _estimated(clip: Clip, moves: bool, smoke: Mask | None, motion: CameraMotion | None = None) -> Backdrop:
+def _estimated(clip: Clip, moves: bool, smoke: Mask | None, motion: CameraMotion | None = None) -> FoundBackground:
     """The background of a clip when none is given; ``smoke`` (rows, columns) was painted over one of its frames.
 
     ``motion`` is that by which the frames are registered.
@@ -151,7 +151,7 @@ def _estimated(clip: Clip, moves: bool, smoke: Mask | None, motion: CameraMotion
     filmed = clip
     if len(clip) == len(clip.whole()) == 1 and (around := color_around(clip.frame(0))) is not None:
         plate, clip = known_plate(around, clip)
-        return Backdrop("color around one frame", clip, plate, frames=1)
+        return FoundBackground("color around one frame", clip, plate, frames=1)
     proxy = Proxy.of(clip)
     white = proxy.white_noise()
     quiet = without_noise_light(clip, Noise(white, lasting_noise(EIGHT_BIT_STEP).lasting))
@@ -167,7 +167,7 @@ def _estimated(clip: Clip, moves: bool, smoke: Mask | None, motion: CameraMotion
             raise ValueError(MOVING_CAMERA)
         red, green, blue = map(float, color)
         plate, clip = known_plate(color, clip)
-        return Backdrop("color", clip, plate, Background(color=(red, green, blue)), len(proxy.numbers))
+        return FoundBackground("color", clip, plate, Background(color=(red, green, blue)), len(proxy.numbers))
     # black, or a color seen often, is the same wherever the camera points; any other may be texture that passes by
     often = found.clear > SEEN_OFTEN and white.max() <= TEXTURE
     plain = color is not None and (often or not color.any())
@@ -188,7 +188,7 @@ def _estimated(clip: Clip, moves: bool, smoke: Mask | None, motion: CameraMotion
     if color is not None:
         plate = _of_one_color(clip, part, color, objects, white)
     span = part.numbers[0], part.numbers[-1]
-    return Backdrop(source, clip.exposed(plate.gain), plate, None, len(part.numbers), span, cut, motion=motion)
+    return FoundBackground(source, clip.exposed(plate.gain), plate, None, len(part.numbers), span, cut, motion=motion)
 
 
 def _picture(clip: Clip, proxy: Proxy, white: Picture, smoke: Mask | None) -> Plate:

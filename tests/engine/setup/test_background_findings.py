@@ -8,12 +8,12 @@ from scipy import ndimage
 
 from smokelift import Background, Clip
 from smokelift.checks import Finding
-from smokelift.extraction.backdrop import Backdrop, find_backdrop
+from smokelift.extraction.find_background import FoundBackground, find_background
 from smokelift.extraction.matte import matte
 from smokelift.extraction.strokes import Strokes
 from smokelift.footage.images import blurred
 from smokelift.output.images import write_image
-from smokelift.setup.backdrop_findings import backdrop_findings, doubts, first_findings
+from smokelift.setup.background_findings import background_findings, doubts, first_findings
 from smokelift.setup.first_estimate import SmokeSamples, first_estimate, sample_smoke
 from tests.engine.films import clear_plate, clip_of, coded, film, puff, wall
 
@@ -33,7 +33,7 @@ def before_tiles(smoke: np.ndarray, tiles: np.ndarray = TILES) -> np.ndarray:
     return tiles * (1 - smoke) + 0.6 * smoke
 
 
-def kinds(found: Backdrop, samples: SmokeSamples = SEEN, given: bool = False) -> list[str]:
+def kinds(found: FoundBackground, samples: SmokeSamples = SEEN, given: bool = False) -> list[str]:
     """What is doubted of a background and frames before it."""
     return [doubt.kind for doubt in doubts(found, samples, given)]
 
@@ -42,7 +42,7 @@ def kinds(found: Backdrop, samples: SmokeSamples = SEEN, given: bool = False) ->
 def gray(tmp_path):
     """A clip of four frames of a gray wall, and its background."""
     with clip_of(tmp_path, [np.full((24, 32, 3), 0.2, np.float32)] * 4) as clip:
-        yield Backdrop("picture", clip, clear_plate(clip.frame(0)), frames=4)
+        yield FoundBackground("picture", clip, clear_plate(clip.frame(0)), frames=4)
 
 
 def puff_at(row: int) -> np.ndarray:
@@ -75,7 +75,7 @@ def test_the_frame_that_shows_most_of_a_background_is_said(tmp_path) -> None:
     whole = clip_of(tmp_path, (before_tiles(each * (n != 5)) for n, each in enumerate(smoke)))
     found = first_findings(first_estimate(whole.part(2, 11), None, None), given=False)
     assert [each.figures["frame"] for each in found if each.kind == "clearest frame"] == [5]
-    late = find_backdrop(whole.part(6, 11), None, None)
+    late = find_background(whole.part(6, 11), None, None)
     assert sample_smoke(late.clip, late.plate).clearest is None
 
 
@@ -85,13 +85,13 @@ def test_strokes_are_said_and_what_is_green_is_not_in_the_plate(gray) -> None:
     smoke, nothing = np.zeros((2, 24, 32), np.bool_)
     smoke[:12] = True
     found = replace(gray, strokes=Strokes(smoke, nothing, ~smoke))
-    assert backdrop_findings(found)[-1] == Finding("strokes", {"smoke": 0.5, "other": 0.0, "behind": 0.5})
+    assert background_findings(found)[-1] == Finding("strokes", {"smoke": 0.5, "other": 0.0, "behind": 0.5})
     assert doubts(found, replace(SEEN, unknown=unknown), given=False) == []
 
 
 def test_smoke_before_a_wall_that_no_frame_shows_is_undetermined(tmp_path) -> None:
     clip = clip_of(tmp_path, (before_tiles(flickering(n)) for n in range(12)))
-    (found,) = backdrop_findings(find_backdrop(clip, None, None))
+    (found,) = background_findings(find_background(clip, None, None))
     assert found.kind == "background partly seen"
 
 
@@ -101,39 +101,39 @@ def test_a_clip_that_is_strongly_compressed_is_said(tmp_path, quantizer, said) -
     for plate, doubted in ((wall(0.2, 0.5), said), (np.zeros((72, 56, 3)), False)):
         path = coded(tmp_path / f"{doubted}.mp4", plate, 0.8, qp=str(quantizer))
         with Clip.open(path) as clip:
-            assert kinds(find_backdrop(clip, None, None)) == ["strong compression"] * doubted
-            assert not kinds(find_backdrop(clip, None, Background(color=(0.1, 0.1, 0.1))))
+            assert kinds(find_background(clip, None, None)) == ["strong compression"] * doubted
+            assert not kinds(find_background(clip, None, Background(color=(0.1, 0.1, 0.1))))
 
 
 def test_what_never_changes_before_one_color_is_said(tmp_path) -> None:
-    remarks = backdrop_findings(find_backdrop(before(0.3, tmp_path), None, None))
+    remarks = background_findings(find_background(before(0.3, tmp_path), None, None))
     assert [remark.kind for remark in remarks] == ["black background", "background with objects"]
 
 
 def test_a_cut_is_said_with_the_frames_of_each_side(tmp_path) -> None:
     shown = (before_tiles(puff_at(60 - 4 * n), TILES if n < 7 else 0.5 - TILES) for n in range(14))
     whole = clip_of(tmp_path, shown)
-    (doubt,) = doubts(find_backdrop(whole.part(2, 12), None, None), SEEN, given=False)
+    (doubt,) = doubts(find_background(whole.part(2, 12), None, None), SEEN, given=False)
     assert doubt == Finding("cut", {"before": 6, "after": 7, "first": 2, "last": 12}, doubt=True)
-    assert kinds(find_backdrop(whole.part(7, 13), None, None)) == []
+    assert kinds(find_background(whole.part(7, 13), None, None)) == []
 
 
 @pytest.mark.parametrize("color", [0.0, 0.2], ids=["black", "gray"])
 def test_one_frame_before_one_color_shows_its_background(tmp_path, color) -> None:
     smoke = puff_at(50)[..., None]
     with clip_of(tmp_path, [np.full((72, 56, 3), color) * (1 - smoke) + 0.6 * smoke]) as clip:
-        found = find_backdrop(clip, None, None)
-        given = find_backdrop(clip, None, Background(color=(color,) * 3))
+        found = find_background(clip, None, None)
+        given = find_background(clip, None, Background(color=(color,) * 3))
         masks = [matte(clip.frame(0), each.plate.at(0)).mask for each in (found, given)]
     assert masks[0][smoke[..., 0] > 0.1].all() and (masks[0] != masks[1]).mean() < 0.01
     assert kinds(found) == ["background of one frame"]
-    assert backdrop_findings(found)[0].kind == ("background of one color" if color else "black background")
+    assert background_findings(found)[0].kind == ("background of one color" if color else "black background")
 
 
 @pytest.mark.parametrize(("count", "doubted"), [(1, False), (2, True), (4, False)])
 def test_a_background_that_few_frames_show_is_doubted(tmp_path, count, doubted) -> None:
     with clip_of(tmp_path, (before_tiles(puff_at(60 - 8 * n)) for n in range(count))) as clip:
-        assert ("background of few frames" in kinds(find_backdrop(clip, None, None))) == doubted
+        assert ("background of few frames" in kinds(find_background(clip, None, None))) == doubted
 
 
 @pytest.mark.parametrize(
@@ -210,9 +210,9 @@ def test_a_clip_from_the_hand_is_registered_and_one_of_a_camera_that_travels_is_
     clip = clip_of(tmp_path, pictures)
     if parallax:
         with pytest.raises(ValueError, match="Stabilize the clip"):
-            find_backdrop(clip, None, None)
+            find_background(clip, None, None)
     else:
-        (said,) = [found for found in backdrop_findings(find_backdrop(clip, None, None)) if "regis" in found.kind]
+        (said,) = [found for found in background_findings(find_background(clip, None, None)) if "regis" in found.kind]
         assert said.kind == "frames registered"
         assert 3 < said.figures["pixels"] < 12
         assert 0 <= said.figures["frame"] < 8
