@@ -12,7 +12,7 @@ from smokelift.extraction.fire import HotPixels, fire_color, firelight, hot_pixe
 from smokelift.extraction.given_background import single_color
 from smokelift.extraction.hidden_plate import plate_and_source
 from smokelift.extraction.matte import matte
-from smokelift.extraction.plate import Plate
+from smokelift.extraction.plate import Plate, cleared
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import Picture, area_average
 from smokelift.scene import Background, Camera, Medium
@@ -122,6 +122,8 @@ def first_estimate(
         light = firelight(clip, doused)
         fire, hot, clip = Fire(light, flame_color or fire_color(clip, light)), burning, doused
         plate, source, samples = with_source(found, clip, sample_smoke(clip, found.plate))
+    if plate is not found.plate:
+        clip = cleared(clip, plate)  # what a mask hides showed the plate as it was, and would be smoke before this one
     return FirstEstimate(clip, found, plate, samples, fire, hot, source)
 
 
@@ -144,7 +146,8 @@ def with_source(
         return found.plate, None, samples
     if plate is not found.plate:
         # what no frame shows clear is unknown, although turns say what is behind it
-        samples = replace(sample_smoke(clip, plate), unknown=samples.unknown, over_known=samples.over_known)
+        found_again = sample_smoke(cleared(clip, plate), plate)
+        samples = replace(found_again, unknown=samples.unknown, over_known=samples.over_known)
     return plate, source, samples
 
 

@@ -70,20 +70,32 @@ def test_what_a_mask_hides_says_nothing_of_how_much_passes(plume, tmp_path, mask
     assert (found.source is None) == masked
 
 
-def test_a_red_cup_that_shines_through_smoke_is_no_fire(plume) -> None:
-    """No frame shows it clear, so the plate that is continued from around it has no cup there, but another one."""
+def smoke_over_a_cup(number: int, picture: np.ndarray) -> np.ndarray:
+    """A frame of smoke that never leaves a red cup before a wall."""
     rows, columns = np.indices((56, 40))
     wall = 0.15 + 0.08 * np.random.default_rng(1).standard_normal((14, 10, 1)).clip(-1.5, 1.5) * (1, 0.9, 0.8)
     behind = np.kron(wall, np.ones((4, 4, 1)))
     behind[(np.abs(rows - 30) < 5) & (np.abs(columns - 20) < 4) | (rows < 8) & (columns < 8)] = 1.2, 0.45, 0.1
+    along = rows - 30 - 12 * np.sin(2.4 * number)
+    depth = 1.2 * np.exp(-((columns - 20) ** 2 + along**2) / 90) + 0.2 * (np.hypot(columns - 20, rows - 30) < 12)
+    clear = np.exp(-depth)[..., None]
+    return (clear * behind + (1 - clear) * 0.35).astype("f4")
 
-    def smoky(number: int, picture: np.ndarray) -> np.ndarray:
-        along = rows - 30 - 12 * np.sin(2.4 * number)
-        depth = 1.2 * np.exp(-((columns - 20) ** 2 + along**2) / 90) + 0.2 * (np.hypot(columns - 20, rows - 30) < 12)
-        clear = np.exp(-depth)[..., None]
-        return (clear * behind + (1 - clear) * 0.35).astype("f4")
 
+def test_a_red_cup_that_shines_through_smoke_is_no_fire(plume) -> None:
+    """No frame shows it clear, so the plate that is continued from around it has no cup there, but another one."""
     with Clip.open(plume.scene.clip) as clip:
-        found = first_estimate(clip.changed(smoky), None, None)
+        found = first_estimate(clip.changed(smoke_over_a_cup), None, None)
     assert found.hot.burn, "before the plate as it was found"
     assert found.fire is None
+
+
+def test_what_a_mask_hides_shows_the_plate_as_it_is_in_the_end(plume, tmp_path) -> None:
+    """Turns change the plate there, too; the clip with the plate before them would show smoke."""
+    seen = np.ones((56, 40, 3))
+    seen[:, 26:] = 0
+    write_image(tmp_path / "mask.png", seen)
+    with Clip.open(plume.scene.clip.path, fps=24, mask=tmp_path / "mask.png") as clip:
+        found = first_estimate(clip.changed(smoke_over_a_cup), None, None)
+        assert np.abs(found.plate.image - found.found.plate.image)[:, 26:].max() > 0.01
+        np.testing.assert_allclose(found.clip.frame(3)[:, 26:], found.plate.image[:, 26:], atol=1e-6)
