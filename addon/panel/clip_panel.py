@@ -244,7 +244,7 @@ def draw_mask(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> 
     if drawn:
         layout.label(text="Smoke may be inside its lines", icon="INFO")
     else:
-        draw_picture(layout, settings, "mask", iface_("white is smoke"))
+        draw_picture(layout, settings, "mask", iface_("white may be smoke"))
 
 
 def draw_picture(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup, name: str, placeholder: str) -> None:
