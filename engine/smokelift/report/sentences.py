@@ -85,6 +85,10 @@ SENTENCES: Mapping[str, str] = {
         "Almost no part of the picture is ever free of smoke, so black is assumed behind it. Give a clean plate or a "
         "color as background."
     ),
+    "smoke everywhere": (
+        "Smoke covers {fraction:.0%} of a frame, and every part of the picture at some time. If another color than the "
+        "one that was found is behind it, give that as background."
+    ),
     "background of few frames": (
         "Only {frames} frames show what is behind the smoke. What is the same in all of them counts as background, "
         "even smoke. Give a clean plate or a color as background."

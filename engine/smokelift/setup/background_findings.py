@@ -24,6 +24,11 @@ crosses a picture has no two straight edges. A generated clip with bars has .98;
 of their rows (docs/clips.md). Most of it has to be covered in a frame too, since a passing puff fills a strip in time.
 """
 
+MIN_EVERYWHERE_FRACTION = 0.98
+"""Fraction of a picture before one color, covered at some time, from which another color may be behind the smoke (and
+most of a frame has to be covered): black ink before dark gray, which counts as gray smoke before black, covers 1.00,
+two clips of smoke before black .20 and .40 (docs/clips.md)."""
+
 MIN_SAME_FRAMES = 4
 """Smallest number of frames in all of which smoke hardly looks the same by chance; in half of all pairs it does."""
 
@@ -107,6 +112,9 @@ def doubts(found: FoundBackground, samples: SmokeSamples, given: bool) -> list[F
         said.append(doubt("background of one frame"))
     if found.source == "black for want of a picture":
         said.append(doubt("background never seen"))
+    covered = _covered_at_a_time(samples) / samples.covered.size
+    if found.source == "color" and samples.covered.mean() >= MIN_EVERYWHERE_FRACTION and covered > MAJORITY:
+        said.append(doubt("smoke everywhere", {"fraction": covered}))
     if found.source == "picture" and 1 < found.frames < MIN_SAME_FRAMES:
         said.append(doubt("background of few frames", {"frames": found.frames}))
     quantizer = median_quantizer(clip.path) if found.source == "picture" else None
@@ -145,7 +153,7 @@ def _shows_smoke(clip: Clip) -> bool:
 
 def _between_bars(samples: SmokeSamples) -> bool:
     """Whether bars beside the picture are all that is background."""
-    at_a_time = len(samples.colors) / max(len(samples.over_known), 1)
+    at_a_time = _covered_at_a_time(samples)
     for covered in (samples.covered, samples.covered.T):
         rows = np.flatnonzero(covered.any(1))
         if len(rows) and rows[0] > 0 and rows[-1] < len(covered) - 1:
@@ -153,3 +161,8 @@ def _between_bars(samples: SmokeSamples) -> bool:
             if picture.mean() >= MIN_BARS_FRACTION and at_a_time > MAJORITY * picture.size:
                 return True
     return False
+
+
+def _covered_at_a_time(samples: SmokeSamples) -> float:
+    """Pixels that smoke covers in a frame, on the mean."""
+    return len(samples.colors) / max(len(samples.over_known), 1)
