@@ -8,7 +8,7 @@ from smokelift.checks import require_kind
 from smokelift.extraction.element import Element, extract_element
 from smokelift.extraction.find_background import find_background
 from smokelift.extraction.hidden_plate import plate_and_source
-from smokelift.extraction.plate import Plate
+from smokelift.extraction.plate import Plate, cleared
 from smokelift.footage.clip import Clip
 from smokelift.footage.image_sequence import is_pattern
 from smokelift.footage.images import Picture
@@ -124,4 +124,5 @@ def extract(clip: Clip, scene: Scene) -> Extraction:
     require_kind(scene, Scene, "scene", "a Scene (Scene() leaves all open, Scene.load reads a file)")
     found = find_background(clip, scene.camera, scene.background)
     smoky = sample_smoke(found.clip, found.plate).smoky or range(len(clip))
-    return Extraction(found.clip, *plate_and_source(found.clip, found.uncut_clip(found.clip), found.plate, smoky))
+    plate, source = plate_and_source(found.clip, found.uncut_clip(found.clip), found.plate, smoky)
+    return Extraction(cleared(found.clip, plate), plate, source)
