@@ -41,26 +41,31 @@ _NUMBER = re.compile(r"-?\d+(\.\d+)?(:\d+)?")  # a number or a range of frames; 
 _NAME = re.compile(r"take_(\d{4,})")
 
 
-class _FileBeside:
-    """The file beside a take's directory with a suffix."""
-
-    def __init__(self, suffix: str) -> None:
-        self._suffix = suffix
-
-    def __get__(self, take: "Take", _owner: type) -> Path:
-        return take.directory.with_suffix(self._suffix)
-
-
 @dataclass(frozen=True)
 class Take:
     """One run's files; ``directory`` holds its sequence."""
 
     directory: Path
 
-    scene_file = _FileBeside(".toml")  # the scene file
-    request_file = _FileBeside(".json")  # the engine's further options
-    log_file = _FileBeside(".log")  # the engine's messages
-    thumbnail_file = _FileBeside(".png")  # the thumbnail of the last frame
+    @property
+    def scene_file(self) -> Path:
+        """The scene file."""
+        return self.directory.with_suffix(".toml")
+
+    @property
+    def request_file(self) -> Path:
+        """The engine's further options."""
+        return self.directory.with_suffix(".json")
+
+    @property
+    def log_file(self) -> Path:
+        """The engine's messages."""
+        return self.directory.with_suffix(".log")
+
+    @property
+    def thumbnail_file(self) -> Path:
+        """The thumbnail of the last frame."""
+        return self.directory.with_suffix(".png")
 
     def copy_mask(self, drawn: Path) -> str:
         """Copy the mask that was drawn for it, so that another does not change it; returns what its scene file has.

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 import smokelift._core as _core
+from smokelift.checks import Mask
 from smokelift.density.lattice_noise import LARGEST_BLUR, SMALLEST_BLUR
 from smokelift.density.observation import ObservedClip, ObservedView
 from smokelift.density.turntable import Turntable
@@ -202,10 +203,8 @@ def _energy(pictures: Sequence[Picture], blur: float) -> float:
         scale *= 2
     square = amount = 0.0
     for picture in pictures:
-        small = block_means(picture, scale)
-        fine, coarse = (ndimage.gaussian_filter(small, each / scale) for each in (blur / 2, blur))
-        body = coarse > BODY * coarse.max()
-        square += float(np.sum((fine - coarse)[body] ** 2 / coarse[body], dtype=np.float64))
+        detail, coarse, body = _octave(block_means(picture, scale), blur / scale)
+        square += float(np.sum(detail[body] ** 2 / coarse[body], dtype=np.float64))
         amount += float(np.sum(coarse[body], dtype=np.float64))
     return square / amount
 
@@ -219,12 +218,17 @@ def fine_energy(pictures: Sequence[Picture]) -> float:
     """
     square = amount = 0.0
     for picture in pictures:
-        fine, coarse = (ndimage.gaussian_filter(picture, blur) for blur in (SMALLEST_BLUR / 2, SMALLEST_BLUR))
-        body = coarse > BODY * coarse.max()
-        waves = scipy.fft.dct((fine - coarse) * body / np.sqrt(np.where(body, coarse, 1)), axis=0, norm="ortho")
+        detail, coarse, body = _octave(picture, SMALLEST_BLUR)
+        waves = scipy.fft.dct(detail * body / np.sqrt(np.where(body, coarse, 1)), axis=0, norm="ortho")
         square += float((np.square(waves).sum(1) * np.arange(len(waves)) / len(waves)).sum(dtype=np.float64))
         amount += float(coarse[body].sum(dtype=np.float64))
     return square / amount if amount > 0 else 0.0
+
+
+def _octave(picture: Picture, blur: float) -> tuple[Picture, Picture, Mask]:
+    """A picture's detail between a blur (deviation, pixels) and half of it, the picture so blurred, and its body."""
+    fine, coarse = (ndimage.gaussian_filter(picture, each) for each in (blur / 2, blur))
+    return fine - coarse, coarse, coarse > BODY * coarse.max()
 
 
 def _unit_energy(blur: float, width: float) -> float:

@@ -26,8 +26,8 @@ of their rows (docs/clips.md). Most of it has to be covered in a frame too, sinc
 
 MIN_EVERYWHERE_FRACTION = 0.98
 """Fraction of a picture before one color, covered at some time, from which another color may be behind the smoke (and
-most of a frame has to be covered): black ink before dark gray, which counts as gray smoke before black, covers 1.00,
-two clips of smoke before black .20 and .40 (docs/clips.md)."""
+most of a frame has to be covered): black ink before dark gray, which counts as gray smoke before black, covers 1.00, a
+filmed plume before black .20 (measured)."""
 
 MIN_SAME_FRAMES = 4
 """Smallest number of frames in all of which smoke hardly looks the same by chance; in half of all pairs it does."""
