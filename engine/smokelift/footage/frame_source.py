@@ -8,12 +8,11 @@ from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
-import scipy.sparse
 
 import smokelift._core as _core
 from smokelift.checks import Finding
 from smokelift.footage.color import Association, Decoder, association
-from smokelift.footage.images import Layer, Picture, area_average, area_weights, linear_to_srgb, look_up, sum_lines
+from smokelift.footage.images import Layer, Picture, area_average, area_weights, linear_to_srgb, look_up
 
 DEFAULT_FPS = 24.0
 """Frames per second if neither the file nor the user gives a rate: that of film."""
@@ -67,37 +66,11 @@ class StoredPicture:
 
     def averaged(self, width: int, height: int) -> Picture:
         """Return the `area_average` of the linear picture."""
-        rows = len(self.values)
-        lines = self.sum_lines(area_weights(rows, height)) if 1 <= height < rows else self.linear()
-        return area_average(lines, width, height)
-
-    def sum_lines(self, weights: scipy.sparse.csr_array) -> Picture:
-        """Return sums (n, columns, 3) of the lines of the linear picture, by weights (n, rows)."""
-        if self.table is None or self.values.dtype != np.uint8:
-            return sum_lines(self.linear(), weights)
-        return _core.sum_lines(self.values, self.table, weights.indptr, weights.indices, weights.data)
-
-    def chequered(self, width: int, height: int, first: int) -> tuple[Picture, Picture]:
-        """Return two `averaged` pictures, one of either color's pixels of a chequerboard.
-
-        ``first`` is 0 if the top left pixel belongs to the first picture, 1 if to the second.
-        """
-        columns, rows = self.size
-        sums = []
-        for odd in (0, 1):
-            weights = area_weights(rows, height).copy()
-            weights.data[weights.indices % 2 != odd] = 0
-            weights.eliminate_zeros()
-            sums.append(self.sum_lines(weights))
-
-        def average(color: int) -> Picture:
-            light = sums[color].copy()
-            light[:, 1::2] = sums[1 - color][:, 1::2]
-            board = np.add.outer(np.arange(rows), np.arange(columns)) % 2 == color
-            filled = np.maximum(area_average(board, width, height), np.float32(1e-6))
-            return np.asarray(area_average(light, width, height) / filled[..., None])
-
-        return average(first), average(1 - first)
+        lines, rows = None, len(self.values)
+        if self.table is not None and self.values.dtype == np.uint8 and 1 <= height < rows:
+            weights = area_weights(rows, height)
+            lines = _core.sum_lines(self.values, self.table, weights.indptr, weights.indices, weights.data)
+        return area_average(self.linear() if lines is None else lines, width, height)
 
     def add_weighted(self, weights: Picture, edges: tuple[Edges, Edges], sums: Picture) -> None:
         """Add the linear picture, times weights (m, n, 3) of its parts, to sums (rows, columns, 3).

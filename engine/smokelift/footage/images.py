@@ -393,7 +393,7 @@ def area_average(image: npt.ArrayLike, width: int, height: int) -> Picture:
     values = np.asarray(image, np.float32)
     rows, columns = values.shape[:2]
     if rows != height:
-        values = sum_lines(values, area_weights(rows, height))
+        values = (area_weights(rows, height) @ values.reshape(rows, -1)).reshape(height, *values.shape[1:])
     if columns != width:
         weights, shape = area_weights(columns, width), (height, width, *values.shape[2:])
         channels = values.reshape(height, columns, -1)
@@ -420,11 +420,6 @@ def blurred(picture: Picture, deviation: float) -> Picture:
     """
     channels = picture.reshape(*picture.shape[:2], -1)
     return _core.blur_picture(channels, _gaussian(deviation)).reshape(picture.shape)
-
-
-def sum_lines(values: Picture, weights: scipy.sparse.csr_array) -> Picture:
-    """Return sums (n, ...) of the lines of a picture (rows, ...), by weights (n, rows)."""
-    return np.asarray(weights @ values.reshape(len(values), -1)).reshape(-1, *values.shape[1:])
 
 
 @lru_cache

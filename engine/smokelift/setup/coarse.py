@@ -122,7 +122,7 @@ def _coarse_view(view: ShotView, number: int, domain: Domain) -> CoarseView:
     """What one camera saw of a frame."""
     working = working_picture(view.camera.at(number), domain)
     first = (working.top + working.left) % 2  # the colors are those of the whole picture's pixels
-    halves = view.clip.stored(number).cut(working.part).chequered(*working.camera.size, first)
+    halves = chequered(view.clip.stored(number).cut(working.part).linear(), *working.camera.size, first)
     plate = view.plate.at(number).through(working.cut, working.pixels)
     pictures = (working.of(view.clip, number), *halves)
     columns, rows = working.camera.size
@@ -134,6 +134,20 @@ def _coarse_view(view: ShotView, number: int, domain: Domain) -> CoarseView:
     detail = area_average(element.transmittance, columns, rows)[..., None] * (plate.image - color)
     even = replace(plate, image=np.broadcast_to(color, plate.image.shape).copy())
     return CoarseView(working.camera, even, *(picture - detail for picture in pictures))
+
+
+def chequered(picture: Image, width: int, height: int, first: int) -> tuple[Image, Image]:
+    """Return two means of a picture (rows, columns, 3) at a size, one of either color's pixels of a chequerboard.
+
+    ``first`` is 0 if the top left pixel belongs to the first picture, 1 if to the second.
+    """
+    board = np.add.outer(*map(np.arange, picture.shape[:2])) % 2 == first
+
+    def average(part: NDArray[np.bool_]) -> Image:
+        filled = np.maximum(area_average(part, width, height), np.float32(1e-6))
+        return np.asarray(area_average(np.where(part[..., None], picture, 0), width, height) / filled[..., None])
+
+    return average(board), average(~board)
 
 
 @dataclass(frozen=True)

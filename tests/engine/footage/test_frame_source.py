@@ -72,28 +72,13 @@ def picture(request) -> StoredPicture:
     return StoredPicture(codes, code_values(top))
 
 
-SIZES = pytest.mark.parametrize("size", [(7, 5), (31, 40), (64, 48), (80, 40), (80, 60)])
-
-
-@SIZES
+@pytest.mark.parametrize("size", [(7, 5), (31, 40), (64, 48), (80, 40), (80, 60)])
 def test_averages(picture, size) -> None:
     for part in (np.s_[:], np.s_[3:41, 5:60]):
         some = picture.cut(lambda pixels, part=part: pixels[part])
         assert np.array_equal(some.averaged(*size), area_average(picture.linear()[part], *size))
     with pytest.raises(ValueError, match="pixel"):
         picture.averaged(4, 0)
-
-
-@SIZES
-@pytest.mark.parametrize("first", [0, 1])
-def test_averages_of_a_chequerboard(picture, size, first) -> None:
-    linear, (rows, columns) = picture.linear(), np.indices((48, 64))
-    for color in (0, 1):
-        board = ((rows + columns) % 2 == (first + color) % 2).astype(np.float32)
-        weight = np.maximum(area_average(board, *size), np.float32(1e-6))
-        expected = area_average(linear * board[..., None], *size) / weight[..., None]
-        for image in (picture, StoredPicture(linear)):
-            assert np.array_equal(image.chequered(*size, first)[color], expected)
 
 
 def test_weighted_sums(picture) -> None:

@@ -10,10 +10,11 @@ from hypothesis import strategies as st
 
 from smokelift.extraction.plate import Plate, known_plate
 from smokelift.footage.clip import Clip
+from smokelift.footage.images import area_average
 from smokelift.footage.noise import EIGHT_BIT_NOISE
 from smokelift.output.images import write_image
 from smokelift.scene import Domain, completed
-from smokelift.setup.coarse import COARSE_SIDE, CoarseFrame, coarse_domain, coarse_frame, held_out
+from smokelift.setup.coarse import COARSE_SIDE, CoarseFrame, chequered, coarse_domain, coarse_frame, held_out
 from smokelift.setup.shot import ShotView
 from smokelift.setup.working_picture import working_picture
 
@@ -82,3 +83,13 @@ def test_the_right_light_and_model_leave_the_least_and_a_wrong_light_is_asked_to
     (gain,) = held_out([tinted], "single", "single", draft.density).gains
     assert gain[2] / gain[0] == pytest.approx(0.5, rel=0.05)
     assert (held_out([blob], "absorption", "absorption", draft.density).gains == 1).all()
+
+
+@pytest.mark.parametrize("size", [(7, 5), (31, 40), (64, 48), (80, 40), (80, 60)])
+@pytest.mark.parametrize("first", [0, 1])
+def test_averages_of_a_chequerboard(size, first) -> None:
+    picture, (rows, columns) = np.random.default_rng(0).random((48, 64, 3), np.float32), np.indices((48, 64))
+    for color, found in enumerate(chequered(picture, *size, first)):
+        board = ((rows + columns) % 2 == (first + color) % 2).astype(np.float32)
+        weight = np.maximum(area_average(board, *size), np.float32(1e-6))
+        assert np.array_equal(found, area_average(picture * board[..., None], *size) / weight[..., None])
