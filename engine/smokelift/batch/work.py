@@ -9,7 +9,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import suppress
@@ -195,9 +195,8 @@ def _run(
 
     All that the engine says is appended to the shot's log; what does not fit on the disk is left out.
     """
-    began, peak = time.monotonic(), [record.memory]
-    notes: list[str] = []
-    message, last_words = {"text": ""}, "it said nothing"
+    began, peak, last_words = time.monotonic(), [record.memory], "it said nothing"
+    events = defaultdict[str, list[dict[str, Any]]](list)
     command, pipe = [*engine, *words, "--progress", "json"], subprocess.PIPE
     with (
         shot.file("log").open("ab", buffering=0) as log,
@@ -211,17 +210,13 @@ def _run(
                 text = line.decode("utf-8", "replace").strip()
                 try:
                     said = json.loads(text)
-                    event = said["event"]
+                    events[said["event"]].append(said)
                 except (ValueError, LookupError, TypeError):
                     last_words = text or last_words
-                    continue
-                if event == "note":
-                    notes.append(said["text"])
-                elif event in ("done", "error"):
-                    message = said
             code = process.wait()
         finally:
             process.kill()  # nothing, unless we are interrupted ourselves
+    message = (events["done"] or events["error"] or [{"text": ""}])[-1]
     status = _STATUS.get(code, "crashed")
     if status != "done" and stop.is_set():  # if it was killed, too
         status = "cancelled"
@@ -232,7 +227,7 @@ def _run(
         record,
         status=status,
         sentence=message["text"] or f"The engine ended by itself ({how}): {last_words}",
-        notes=notes or record.notes,
+        notes=[note["text"] for note in events["note"]] or record.notes,
         seconds=record.seconds + time.monotonic() - began,
         memory=peak[0],
     )

@@ -109,8 +109,7 @@ class Clip:
         """
         try:
             given = path if isinstance(path, ClipSource) else ClipSource(file_path(path, "path"))
-            file = None if mask is None else file_path(mask, "mask")
-            changes: dict[str, Any] = {"fps": fps, "frames": frames, "transfer": transfer, "mask": file}
+            changes: dict[str, Any] = {"fps": fps, "frames": frames, "transfer": transfer, "mask": mask}
             given = replace(given, **{name: value for name, value in changes.items() if value is not None})
         except SceneError as error:
             raise ClipError(str(error) if error.key == "path" else f"{path}: {error}") from error

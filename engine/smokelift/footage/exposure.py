@@ -5,8 +5,6 @@ of the shortest interval that holds a third of the ratios (the shorth: Andrews e
 1972).
 """
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 

@@ -8,6 +8,7 @@ from PIL import Image
 from smokelift.checks import Finding
 from smokelift.footage.frame_source import DEFAULT_FPS, ClipError, DamagedFrameError, FrameSource, StoredPicture
 from smokelift.footage.images import (
+    DECODERS,
     READABLE,
     Codes,
     ImageError,
@@ -15,7 +16,6 @@ from smokelift.footage.images import (
     PictureKindError,
     Transfer,
     area_average,
-    decoder,
     encoded_values,
     linear_layer,
     read_stored,
@@ -42,7 +42,7 @@ class ImageSequence(FrameSource):
         self._size: tuple[int, int] | None = None
         samples = self._sound_samples(self._stored)
         codes = (stored for stored in samples if not isinstance(stored, tuple) and stored.shape[-1] == 4)
-        self._find_matte(map(encoded_values, codes), decoder(transfer), self._sound_samples(self._layer))
+        self._find_matte(map(encoded_values, codes), DECODERS[transfer or "srgb"], self._sound_samples(self._layer))
 
     @property
     def notes(self) -> tuple[Finding, ...]:

@@ -24,14 +24,7 @@ import numpy.typing as npt
 import OpenEXR
 import scipy.sparse
 from av.container import InputContainer
-from PIL import Image, ImageOps
-from PIL.TiffImagePlugin import (
-    BITSPERSAMPLE,
-    PHOTOMETRIC_INTERPRETATION,
-    SAMPLEFORMAT,
-    TILEWIDTH,
-    ImageFileDirectory_v2,
-)
+from PIL import Image, ImageOps, TiffImagePlugin
 
 import smokelift._core as _core
 from smokelift.footage.color import Association, Decoder, Encoding, hlg_to_linear, pq_to_linear
@@ -120,7 +113,7 @@ def linear_to_srgb(linear: npt.ArrayLike) -> Picture:
     return np.asarray(np.where(v <= np.float32(0.0031308), v * np.float32(12.92), curve))
 
 
-_DECODERS: Mapping[Encoding, Decoder] = {
+DECODERS: Mapping[Encoding, Decoder] = {
     "linear": partial(np.asarray, dtype=np.float32),
     "srgb": srgb_to_linear,
     "hlg": hlg_to_linear,
@@ -128,10 +121,10 @@ _DECODERS: Mapping[Encoding, Decoder] = {
 }
 
 
-def decode(codes: Codes, encoding: Encoding | None = None, white: float = 1.0, held: Association = "straight") -> Layer:
+def decode(codes: Codes, encoding: Encoding, white: float = 1.0, held: Association = "straight") -> Layer:
     """Return integer pixels [row, column, rgb or rgba] of 8 or 16 bits as linear RGB over black, and their alpha.
 
-    The encoding is sRGB by default. ``white`` is the fraction of the largest code that means white, and opaque.
+    ``white`` is the fraction of the largest code that means white, and opaque.
     ``held`` says how colors are held beside alpha.
     """
     linear = code_values(np.iinfo(codes.dtype).max, encoding, white)
@@ -143,20 +136,15 @@ def decode(codes: Codes, encoding: Encoding | None = None, white: float = 1.0, h
     if held == "premultiplied in code values":
         over_black = encoded[..., :3]
         own = np.minimum(np.divide(over_black, opacity, out=np.zeros_like(over_black), where=opacity > 0), 1)
-        return decoder(encoding)(own) * opacity, alpha
+        return DECODERS[encoding](own) * opacity, alpha
     picture = look_up(linear, codes[..., :3])
     return picture * opacity if held == "straight" else picture, alpha
 
 
-def decoder(encoding: Encoding | None) -> Decoder:
-    """Return the function that makes values of an encoding, by default sRGB, linear."""
-    return _DECODERS[encoding or "srgb"]
-
-
 @lru_cache
-def code_values(top: int, encoding: Encoding | None = None, white: float = 1.0) -> Picture:
+def code_values(top: int, encoding: Encoding = "srgb", white: float = 1.0) -> Picture:
     """Return the linear values of the codes 0 to ``top``, read-only; see `decode`."""
-    values = decoder(encoding)(np.arange(top + 1, dtype=np.float32) / np.float32(top * white))
+    values = DECODERS[encoding](np.arange(top + 1, dtype=np.float32) / np.float32(top * white))
     values.flags.writeable = False
     return values
 
@@ -179,7 +167,7 @@ def read_layer(path: str | Path, transfer: Transfer | None = None) -> Layer:
 def linear_layer(stored: Codes | Layer, transfer: Transfer | None, held: Association = "straight") -> Layer:
     """Return what `read_stored` has read as `read_layer` does; ``held`` is how integers hold colors beside alpha."""
     if not isinstance(stored, tuple):
-        return decode(stored, transfer, held=held)
+        return decode(stored, transfer or "srgb", held=held)
     values, alpha = stored
     return srgb_to_linear(values) if transfer == "srgb" else values, alpha
 
@@ -286,13 +274,14 @@ def _read_integers(path: Path) -> Codes:
 
 def _is_plain_tiff(path: Path, head: bytes) -> bool:
     """Whether FFmpeg reads a TIFF, which it does with the alpha that is stored, and Pillow without."""
-    tags = ImageFileDirectory_v2(head[:8])
+    tags = TiffImagePlugin.ImageFileDirectory_v2(head[:8])
     with path.open("rb") as file:
         file.seek(tags.next)
         tags.load(file)
-    gray_or_rgb = tags.get(PHOTOMETRIC_INTERPRETATION) in (1, 2) and TILEWIDTH not in tags
-    wide = max(tags.get(BITSPERSAMPLE, (1,))) > 8
-    floating = 3 in tags.get(SAMPLEFORMAT, ())  # TIFF 6.0, section 19
+    photometric, tiled = tags.get(TiffImagePlugin.PHOTOMETRIC_INTERPRETATION), TiffImagePlugin.TILEWIDTH in tags
+    gray_or_rgb = photometric in (1, 2) and not tiled
+    wide = max(tags.get(TiffImagePlugin.BITSPERSAMPLE, (1,))) > 8
+    floating = 3 in tags.get(TiffImagePlugin.SAMPLEFORMAT, ())  # TIFF 6.0, section 19
     if floating or (wide and not gray_or_rgb):
         raise PictureKindError(
             f"{path}: is neither gray nor RGB in whole numbers, or is stored in tiles; save it as .exr, or as an "

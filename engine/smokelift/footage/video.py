@@ -24,18 +24,17 @@ import numpy.typing as npt
 from av.filter import Graph
 from av.sidedata.sidedata import Type as SideData
 from av.video.reformatter import ColorRange, Interpolation
-from av.video.stream import VideoStream
 
 from smokelift.checks import Finding
 from smokelift.footage.color import ENCODINGS, PRIMARIES, Encoding, to_bt709
 from smokelift.footage.frame_source import DEFAULT_FPS, ClipError, DamagedFrameError, FrameSource, StoredPicture
 from smokelift.footage.images import (
+    DECODERS,
     Layer,
     Picture,
     Transfer,
     code_values,
     decode,
-    decoder,
     encoded_values,
     linear_to_srgb,
     open_container,
@@ -150,11 +149,15 @@ class Video(FrameSource):
             self._container = open_container(self._path)
         except (av.FFmpegError, ValueError) as error:
             raise _unreadable(self._path, error) from error
-        try:
-            self._stream = self._usable_stream()
-        except ClipError:
-            self._container.close()
-            raise
+        stream = next(iter(self._container.streams.video), None)
+        if stream is None:
+            raise _unreadable(self._path, None)
+        if stream.codec_context is None:
+            raise ClipError(
+                f"{self._path}: holds video of a kind that cannot be decoded; convert it, for example to H.264"
+            )
+        require_size(self._path, (stream.width, stream.height), ClipError)
+        self._stream = stream
         # a decoder of several frames at once loses sound ones with the one that fails
         self._stream.thread_type = "SLICE" if self._failed else "AUTO"
         decoder = _ALPHA_DECODERS.get(self._stream.codec_context.name)
@@ -163,17 +166,6 @@ class Video(FrameSource):
             self._decoder = av.CodecContext.create(av.Codec(decoder, "r"), "r")
         self._decoded = self._frames()
         self._next = 0  # index into _times of the frame that is decoded next
-
-    def _usable_stream(self) -> VideoStream:
-        if not self._container.streams.video:
-            raise _unreadable(self._path, None)
-        stream = self._container.streams.video[0]
-        if stream.codec_context is None:
-            raise ClipError(
-                f"{self._path}: holds video of a kind that cannot be decoded; convert it, for example to H.264"
-            )
-        require_size(self._path, (stream.width, stream.height), ClipError)
-        return stream
 
     def _frames(self) -> Iterator[tuple[int | None, av.VideoFrame]]:
         """Decode times and frames from where the container stands; what cannot be decoded is left out."""
@@ -330,7 +322,7 @@ class Video(FrameSource):
                 return
             frames.append(frame)
         encoded = (encoded_values(self._codes(frame), _white(frame)) for frame in frames)
-        self._find_matte(encoded, decoder(self._encoding()), map(self._layer, frames))
+        self._find_matte(encoded, DECODERS[self._encoding()], map(self._layer, frames))
 
     def _size(self) -> tuple[int, int]:
         """Return the width and height that pictures are read at, before they are turned: pixels are square."""
@@ -338,9 +330,8 @@ class Video(FrameSource):
         square = abs(shape - 1) <= SQUARE
         return readable_size(self._stream.width * (1 if square else Fraction(shape)), self._stream.height)
 
-    def _encoding(self) -> Encoding | None:
-        """The encoding of the codes; None is sRGB."""
-        return self._transfer or ENCODINGS.get(self._stream.codec_context.color_trc)
+    def _encoding(self) -> Encoding:
+        return self._transfer or ENCODINGS.get(self._stream.codec_context.color_trc, "srgb")
 
     def _codes(self, frame: av.VideoFrame) -> npt.NDArray[Any]:
         """RGB, and alpha if there is any, in codes, not yet turned upright."""

@@ -3,22 +3,19 @@
 from collections.abc import Iterable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 from scipy import ndimage
 
 from smokelift.checks import Array, Doubles, Finding, Mask, counted
 from smokelift.extraction.matte import Matte, matte
-from smokelift.extraction.plate import Plate
-from smokelift.footage.images import area_average, linear_to_srgb
-from smokelift.output.images import eight_bit
+from smokelift.extraction.plate import Plate, resized
+from smokelift.footage.images import linear_to_srgb
+from smokelift.output.images import Tile, eight_bit
 from smokelift.report.page import TILE, Color, Page, Panel, tile_size
 from smokelift.scene import SHADOWED, Camera, DirectionalLight, Domain, PointLight, Scene
 from smokelift.scene.projection import project_points
 from smokelift.setup.first_estimate import unknown_part
 from smokelift.setup.shot import Shot
-
-Tile = NDArray[np.uint8]
 
 BOX, LIGHT, SMOKE, HIDDEN, PATH = (90, 200, 255), (255, 220, 60), (255, 150, 40), (230, 60, 200), (120, 255, 120)
 """Colors (sRGB codes) of the box, light, smoke, unknown background and camera's path."""
@@ -46,8 +43,7 @@ def inspection_page(shot: Shot, given: Scene, known: Sequence[Finding], findings
     """
     number = shot.smoky[0] if shot.smoky else 0
     columns, rows = tile_size(*shot.clip.size)
-    pixels = shot.clip.size[0] * shot.clip.size[1] / (columns * rows)
-    whole = shot.views[0].plate.through(lambda full: area_average(full, columns, rows), pixels)
+    whole = resized(shot.views[0].plate, (columns, rows))
     plate = whole.at(number)
     picture = shot.clip.stored(number).averaged(columns, rows)
     seen = matte(picture, plate)

@@ -14,7 +14,7 @@ from smokelift.extraction.hidden_plate import plate_and_source
 from smokelift.extraction.matte import matte
 from smokelift.extraction.plate import Plate, cleared
 from smokelift.footage.clip import Clip
-from smokelift.footage.images import Picture, area_average
+from smokelift.footage.images import Picture, area_average, reduced_size
 from smokelift.scene import Background, Camera, Medium
 from smokelift.scene.checks import Vector
 
@@ -168,7 +168,7 @@ def sample_smoke(clip: Clip, plate: Plate) -> SmokeSamples:
     """Find the smoke in frames spread over a clip at its plate's exposure."""
     width, height = clip.size
     scale = max(1.0, max(width, height) / SAMPLE_SIDE)
-    columns, rows = (max(1, round(side / scale)) for side in (width, height))
+    columns, rows = reduced_size(width, height, SAMPLE_SIDE)
     covered, unknown = np.zeros((2, rows, columns), np.bool_)
     colors, behind = [], []
     over_known: dict[int, int] = {}
