@@ -191,10 +191,7 @@ def run_here(shots: ShotMemory, task: Task, memory: int, workers: int) -> Iterat
 def _run(
     shot: BatchShot, record: Record, words: Sequence[str], stop: threading.Event, engine: Sequence[str]
 ) -> tuple[Record, dict[str, Any]]:
-    """Run the engine to its end, with arguments of ``smokelift``; return the record then, and its last message.
-
-    All that the engine says is appended to the shot's log; what does not fit on the disk is left out.
-    """
+    """Run the engine and log what it says, as far as the disk allows; the record at its end, and its last message."""
     began, peak, last_words = time.monotonic(), [record.memory], "it said nothing"
     events = defaultdict[str, list[dict[str, Any]]](list)
     command, pipe = [*engine, *words, "--progress", "json"], subprocess.PIPE

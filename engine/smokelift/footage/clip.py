@@ -292,8 +292,7 @@ class Clip:
         return self._with(_read=read, mask=mask, _count=count)
 
     def _sound(self, read: Callable[[int], Value], n: int) -> Value:
-        """What is read of frame ``n``, or of what stands in for a damaged one: the last sound frame before it, else the
-        next after it."""
+        """What is read of frame ``n``, or of what stands in for a damaged one (see `damaged`)."""
         if not isinstance(n, int | np.integer) or not 0 <= n < len(self):
             raise ClipError(f"{self.path}: there is no frame {n!r}; there are 0 to {len(self) - 1}")
         try:

@@ -1,6 +1,7 @@
 """Clips of numbered pictures."""
 
 import re
+from contextlib import suppress
 from pathlib import Path
 
 from PIL import Image
@@ -9,6 +10,7 @@ from smokelift.checks import Finding
 from smokelift.footage.frame_source import DEFAULT_FPS, ClipError, DamagedFrameError, FrameSource, StoredPicture
 from smokelift.footage.images import (
     DECODERS,
+    FOREIGN_ERRORS,
     READABLE,
     Codes,
     ImageError,
@@ -38,7 +40,8 @@ class ImageSequence(FrameSource):
         self.count = len(self.files)
         if fps is None and self.count > 1:
             self.warning = Finding("pictures without a frame rate", {"path": str(path), "fps": DEFAULT_FPS})
-        self._set_lens(_focal_length(self.files[0]))
+        with suppress(*FOREIGN_ERRORS), Image.open(self.files[0]) as picture:
+            self._set_lens(picture.getexif().get_ifd(0x8769).get(0xA405))  # FocalLengthIn35mmFilm of Exif
         self._size: tuple[int, int] | None = None
         samples = self._sound_samples(self._stored)
         codes = (stored for stored in samples if not isinstance(stored, tuple) and stored.shape[-1] == 4)
@@ -130,12 +133,3 @@ def _found(path: Path, prefix: str, digits: int, suffix: str) -> dict[int, Path]
     folder = path.parent.iterdir() if path.parent.is_dir() else ()
     found = {match[1]: each for each in folder if (match := numbered.fullmatch(each.name))}
     return {int(number): each for number, each in found.items() if len(number) >= digits}
-
-
-def _focal_length(path: Path) -> object:
-    """The focal length in a picture's EXIF, in millimeters on 35 mm film; None if there is none."""
-    try:
-        with Image.open(path) as picture:
-            return picture.getexif().get_ifd(0x8769).get(0xA405)  # FocalLengthIn35mmFilm of Exif
-    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError):  # a picture without such tags
-        return None

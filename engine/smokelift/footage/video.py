@@ -129,10 +129,9 @@ class Video(FrameSource):
         if not self._keys:
             return ()  # only frames that decode were counted
         wanted = [self._times[self._shown[n]] for n in range(first, last + 1)]
-        from_start = self._failed and wanted[0] == self._times[0]  # and one frame at a time
         self._seek(wanted[0])
         good = self._good_times(wanted[-1])
-        if not (from_start or good.issuperset(wanted)):  # as in `_found`
+        if not good.issuperset(wanted):  # as in `_found`
             self._rewind()
             good |= self._good_times(wanted[-1])
         self._rewind()

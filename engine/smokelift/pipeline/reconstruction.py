@@ -97,28 +97,23 @@ class Reconstruction:
             provenance=[part(finding) for finding in provenance(shot)],
             sources=sources(shot),
         ) as writer:
-            if writer.state is not None or not writer.finished:
-                self._write_rest(writer, on_frame)
+            last = None if writer.state is None else CarriedState.read(writer.state, shot)
+            rest = frames_after(last, shot, self.method) if last is not None or not writer.finished else iter(())
+            # no name here holds a frame or its velocities while the next is computed: they take most of the memory
+            del last
+            for frame, carried in rest:
+                writer.write(
+                    frame.number,
+                    frame.density,
+                    frame.velocity.faces,
+                    frame.figures,
+                    flame=frame.flame,
+                    state=carried.stored(),
+                )
+                if on_frame is not None:
+                    on_frame(frame)
+                del frame, carried
         return Sequence.open(directory)
-
-    def _write_rest(self, writer: SequenceWriter, on_frame: Callable[[Frame], object] | None) -> None:
-        """Write the frames that are not finished."""
-        # no name here holds a frame or its velocities while the next is computed: they take most of the memory
-        last = None if writer.state is None else CarriedState.read(writer.state, self.shot)
-        frames = frames_after(last, self.shot, self.method)
-        del last
-        for frame, carried in frames:
-            writer.write(
-                frame.number,
-                frame.density,
-                frame.velocity.faces,
-                frame.figures,
-                flame=frame.flame,
-                state=carried.stored(),
-            )
-            if on_frame is not None:
-                on_frame(frame)
-            del frame, carried
 
 
 def reconstruct(

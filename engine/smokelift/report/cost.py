@@ -259,14 +259,10 @@ def _smoky_fractions(shot: Shot, settings: Settings) -> list[float]:
 
 @cache
 def _seconds_per_voxel() -> float:
-    """Return the seconds that a Poisson solve takes on this machine for each voxel; timed once.
-
-    By its processor time on one thread: what passes is up to three times as much while other programs, or a run
-    of our own, are at work.
-    """
+    """Return the seconds that a Poisson solve takes on this machine for each voxel; timed once."""
     field = np.zeros(TIMED_GRID, np.float32)
     scipy.fft.idctn(scipy.fft.dctn(field))  # the first finds nothing in the caches
-    began = time.process_time()
+    began = time.process_time()  # while other programs, or a run of our own, are at work, up to thrice as much passes
     for _ in range(TIMED_SOLVES):
         scipy.fft.idctn(scipy.fft.dctn(field))  # on one thread: a system may allow no more
     return (time.process_time() - began) / (WORKERS * TIMED_SOLVES * field.size)

@@ -6,7 +6,7 @@ import numpy as np
 from PIL import Image, ImageDraw
 from scipy import ndimage
 
-from smokelift.checks import Array, Doubles, Finding, Mask, counted
+from smokelift.checks import Array, Doubles, Finding, counted
 from smokelift.extraction.matte import Matte, matte
 from smokelift.extraction.plate import Plate, resized
 from smokelift.footage.images import linear_to_srgb
@@ -49,6 +49,9 @@ def inspection_page(shot: Shot, given: Scene, known: Sequence[Finding], findings
     seen = matte(picture, plate)
     camera = shot.scene.camera.at(number).resized(columns, rows)
     unknown = unknown_part(whole, shot.clip, number)
+    behind = eight_bit(plate.image)
+    marked = behind.copy()
+    marked[unknown] = np.rint(0.4 * behind[unknown] + 0.6 * np.array(HIDDEN))
     path = _path(shot, camera, picture)
     lit = " and the light" if _light_starts(shot, shot.scene.domain) else ""
     hidden = shot.clip.mask
@@ -56,9 +59,9 @@ def inspection_page(shot: Shot, given: Scene, known: Sequence[Finding], findings
     frame = f"frame {shot.clip.numbers[number]}"
     panels = [
         Panel(f"{frame} with the box{masked}{lit}", _with_box(shot, camera, picture, number)),
-        Panel("background", eight_bit(plate.image)),
+        Panel("background", behind),
         Panel(f"smoke of {frame}: {seen.mask.mean():.1%} of the picture", _matte_picture(seen)),
-        Panel(f"unknown background: {unknown.mean():.1%} of the picture", _unknown_picture(plate, unknown)),
+        Panel(f"unknown background: {unknown.mean():.1%} of the picture", marked),
         Panel("brightness: frame (gray), its smoke (orange), background (blue)", _histogram(picture, plate, seen)),
         *([] if path is None else [Panel("path of the box's middle while the camera moves", path)]),
     ]
@@ -118,13 +121,6 @@ def _matte_picture(seen: Matte) -> Tile:
     """The deviation from the background, the more orange the surer it is smoke."""
     strength = np.clip(seen.deviation / MAX_SHOWN_DEVIATION, 0, 1)[..., None]
     return np.asarray(np.rint(strength * (255 + seen.probability[..., None] * (np.array(SMOKE) - 255))), np.uint8)
-
-
-def _unknown_picture(plate: Plate, unknown: Mask) -> Tile:
-    """The background, with its unknown part in one color."""
-    codes = eight_bit(plate.image)
-    codes[unknown] = np.rint(0.4 * codes[unknown] + 0.6 * np.array(HIDDEN))
-    return codes
 
 
 def _histogram(picture: Array, plate: Plate, seen: Matte) -> Tile:

@@ -5,9 +5,8 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from smokelift.checks import shown
+from smokelift.checks import Doubles, shown
 from smokelift.scene.checks import SceneError, Vector, integer, items, number, positive, set_fields, unexpected, vector
 from smokelift.scene.domain import Box
 
@@ -213,7 +212,7 @@ def _rigid(value: Any, key: str = "matrix") -> Matrix:
     return as_matrix(np.array(rows))
 
 
-def as_matrix(values: NDArray[np.float64]) -> Matrix:
+def as_matrix(values: Doubles) -> Matrix:
     """Return a 4x4 array as the nested tuples that a frozen camera holds."""
     rows = [tuple(float(v) for v in row) for row in values]
     return tuple((r[0], r[1], r[2], r[3]) for r in rows)
@@ -244,7 +243,7 @@ def shared_part(whole: Camera, camera: Camera) -> tuple[slice, slice] | None:
     return np.s_[top:bottom, left:right] if inside and right > left and bottom > top else None
 
 
-def _turned(matrix: NDArray[np.float64], domain: Box, yaw_degrees: float, pitch_degrees: float) -> Matrix:
+def _turned(matrix: Doubles, domain: Box, yaw_degrees: float, pitch_degrees: float) -> Matrix:
     """A camera's matrix after `orbit`."""
     center = np.array(domain.centre)
     right = matrix[:3, 0]
@@ -255,7 +254,7 @@ def _turned(matrix: NDArray[np.float64], domain: Box, yaw_degrees: float, pitch_
     return as_matrix(moved)
 
 
-def _rotation(axis: NDArray[np.float64], degrees: float) -> NDArray[np.float64]:
+def _rotation(axis: Doubles, degrees: float) -> Doubles:
     """Rotation matrix about a unit axis (Rodrigues)."""
     angle = np.radians(degrees)
     cross = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])

@@ -96,6 +96,13 @@ def set_fields(instance: object, **values: object) -> None:
         object.__setattr__(instance, name, value)
 
 
+def check_given(instance: object, **checks: Callable[[Any, str], object]) -> None:
+    """Set those fields of a frozen dataclass that are not None to what a function makes of the value and the name."""
+    for name, check in checks.items():
+        if (value := getattr(instance, name)) is not None:
+            set_fields(instance, **{name: check(value, name)})
+
+
 def file_path(value: Any, key: str, expected: str = "the path of a file") -> Path:
     """Return ``value`` as a path, or raise a SceneError that names ``key``."""
     if not isinstance(value, str | Path) or not str(value):

@@ -14,9 +14,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from smokelift.checks import listed, one_of, require_kind, shown
+from smokelift.checks import Mask, listed, one_of, require_kind, shown
 from smokelift.scene.camera import Camera
 from smokelift.scene.checks import SceneError, file_path, integer, set_fields, unexpected
 from smokelift.scene.domain import Box, Domain, Inlet, Side, checked_sides
@@ -71,18 +70,6 @@ class Scene:
 
     def __post_init__(self) -> None:
         """Check what no table can check alone."""
-        self._check_kinds()
-        for table, given in (("inlet", self.inlets), ("lights", self.lights), ("views", self.views)):
-            if len(given) > MAX_LISTED:
-                raise SceneError(f"is given {len(given)} times; {MAX_LISTED} at most", table=table)
-        set_fields(self, closed=checked_sides(self.closed))
-        if self.scattering not in (None, *SCATTERINGS):
-            raise unexpected(self.scattering, "scattering", f"one of {one_of(SCATTERINGS)}", "medium")
-        if self.domain is not None:
-            self._check_places(self.domain)
-
-    def _check_kinds(self) -> None:
-        """Refuse a part that is of another kind, and make tuples of lists."""
         require_kind(self.clip, ClipSource | None, "clip", 'a ClipSource, such as ClipSource("clip.mp4")', SceneError)
         require_kind(self.camera, Camera | None, "camera", "a Camera", SceneError)
         require_kind(self.domain, Box | None, "domain", "a Domain", SceneError)
@@ -94,6 +81,14 @@ class Scene:
             views=listed(self.views, View, "views", "a list of Views", SceneError),
             inlets=listed(self.inlets, Inlet, "inlets", "a list of Inlets", SceneError),
         )
+        for table, given in (("inlet", self.inlets), ("lights", self.lights), ("views", self.views)):
+            if len(given) > MAX_LISTED:
+                raise SceneError(f"is given {len(given)} times; {MAX_LISTED} at most", table=table)
+        set_fields(self, closed=checked_sides(self.closed))
+        if self.scattering not in (None, *SCATTERINGS):
+            raise unexpected(self.scattering, "scattering", f"one of {one_of(SCATTERINGS)}", "medium")
+        if self.domain is not None:
+            self._check_places(self.domain)
 
     def _check_places(self, domain: Box) -> None:
         """Refuse an inlet outside the domain, a light inside it, and a camera that does not see it."""
@@ -197,7 +192,7 @@ class CompleteScene(Scene):
             lacks = "no domain" if self.domain is None else "a domain without a resolution"
             raise ValueError(f"The scene has {lacks}; give its corners and its resolution.")
 
-    def inflow(self) -> NDArray[np.bool_] | None:
+    def inflow(self) -> Mask | None:
         """Return the voxels where smoke enters, shape (nx, ny, nz); None if no inlet is marked."""
         if not self.inlets:
             return None

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from smokelift.checks import one_of
+from smokelift.checks import Doubles, Mask, one_of
 from smokelift.scene.checks import SceneError, Vector, integer, items, positive, set_fields, unexpected, vector
 
 Side = Literal["x-", "x+", "y-", "y+", "z-", "z+"]
@@ -64,7 +63,7 @@ class Box:
         """Return whether a point lies inside the box or on its surface."""
         return all(low <= p <= high for low, p, high in zip(self.min, point, self.max, strict=True))
 
-    def corners(self) -> np.ndarray[Any, np.dtype[np.float64]]:
+    def corners(self) -> Doubles:
         """Return the eight corners in meters, shape (8, 3)."""
         axes = np.meshgrid(*zip(self.min, self.max, strict=True), indexing="ij")
         return np.asarray(np.stack(axes, axis=-1).reshape(8, 3))
@@ -169,7 +168,7 @@ class Domain(Box):
         x, y, z = (span.stop - span.start for span in voxels)
         return Domain((a, b, c), (d, e, f), (x, y, z))
 
-    def offsets(self, point: Vector) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    def offsets(self, point: Vector) -> tuple[Doubles, Doubles, Doubles]:
         """Return the meters from a point to the voxels' centers along x, y and z, ready to be broadcast."""
         places = zip(self.min, point, self.resolution, strict=True)
         x, y, z = np.ix_(*(low + (np.arange(n) + 0.5) * self.voxel_size - at for low, at, n in places))
@@ -200,7 +199,7 @@ class Inlet:
         nearest = np.clip(self.centre, domain.min, domain.max)
         return math.dist(self.centre, nearest) <= self.radius
 
-    def voxels(self, domain: Domain) -> NDArray[np.bool_]:
+    def voxels(self, domain: Domain) -> Mask:
         """Return the voxels whose centers lie in it, or the nearest ones if none does, shape (nx, ny, nz) bool."""
         x, y, z = domain.offsets(self.centre)
         squares = x**2 + y**2 + z**2
@@ -222,7 +221,7 @@ def open_sides(closed: Iterable[Side]) -> Iterator[tuple[Side, int, bool]]:
             yield side, number // 2, number % 2 == 1
 
 
-def box_around(voxels: NDArray[np.bool_], margin: int) -> tuple[slice, slice, slice]:
+def box_around(voxels: Mask, margin: int) -> tuple[slice, slice, slice]:
     """The smallest box that holds the marked voxels and so many more on each side; an empty one without any."""
     along_x = voxels.any((1, 2))
     # rows of memory are read one after the other, and only where there is something
@@ -231,7 +230,7 @@ def box_around(voxels: NDArray[np.bool_], margin: int) -> tuple[slice, slice, sl
     return x, y, z
 
 
-def _span(marked: NDArray[np.bool_], margin: int) -> slice:
+def _span(marked: Mask, margin: int) -> slice:
     """Return the slice from the first to the last mark of a row, and so many more at both ends; empty without any."""
     places = np.flatnonzero(marked)
     if not places.size:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from smokelift.scene.checks import Vector, number, positive, set_fields, unexpected, vector
+from smokelift.scene.checks import Vector, check_given, number, positive, set_fields, unexpected, vector
 
 Scattering = Literal["multiple", "single", "unshadowed", "absorption"]
 """How light is scattered: any number of times, once and with self-shadowing, once without, or not at all."""
@@ -47,8 +47,8 @@ class Medium:
             albedo=number(self.albedo, "albedo", "a number from 0 to 1", lambda v: 0.0 <= v <= 1.0),
             anisotropy=number(self.anisotropy, "anisotropy", "a number between -1 and 1", lambda v: -1.0 < v < 1.0),
             color=_fractions(self.color, "color"),
-            flame_color=None if self.flame_color is None else _fractions(self.flame_color, "flame_color"),
         )
+        check_given(self, flame_color=_fractions)
 
     @property
     def albedos(self) -> Vector:

@@ -9,6 +9,7 @@ from smokelift.scene.camera import Camera
 from smokelift.scene.checks import (
     SceneError,
     Vector,
+    check_given,
     color,
     file_path,
     integer,
@@ -47,8 +48,7 @@ class ClipSource:
 
     def __post_init__(self) -> None:
         set_fields(self, path=file_path(self.path, "path"))
-        if self.fps is not None:
-            set_fields(self, fps=positive(self.fps, "fps"))
+        check_given(self, fps=positive, mask=file_path)
         if self.frames is not None:
             expected = "[first, last], whole numbers from 0, first not after last"
             first, last = (integer(v, "frames", expected) for v in items(self.frames, 2, "frames", expected))
@@ -57,8 +57,6 @@ class ClipSource:
             set_fields(self, frames=(first, last))
         if self.transfer not in (None, "srgb", "linear"):
             raise unexpected(self.transfer, "transfer", '"srgb" or "linear"')
-        if self.mask is not None:
-            set_fields(self, mask=file_path(self.mask, "mask"))
 
     @property
     def first(self) -> int:
@@ -93,14 +91,7 @@ class Background:
         given = [key for key in ("color", "image", "frame") if getattr(self, key) is not None]
         if len(given) > 1:
             raise SceneError(f"takes {given[0]} or {given[1]}, not both", key=given[1])
-        if self.color is not None:
-            set_fields(self, color=color(self.color, "color"))
-        if self.image is not None:
-            set_fields(self, image=file_path(self.image, "image"))
-        if self.frame is not None:
-            set_fields(self, frame=_frames(self.frame, "frame"))
-        if self.strokes is not None:
-            set_fields(self, strokes=file_path(self.strokes, "strokes"))
+        check_given(self, color=color, image=file_path, frame=_frames, strokes=file_path)
 
     @property
     def estimated(self) -> bool:

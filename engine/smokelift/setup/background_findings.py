@@ -1,5 +1,6 @@
 """What is found of the background of a clip: how it was found, and why the result may be wrong."""
 
+from contextlib import suppress
 from functools import partial
 
 import numpy as np
@@ -133,22 +134,16 @@ def doubts(found: FoundBackground, samples: SmokeSamples, given: bool) -> list[F
 
 def what_helps(clip: Clip, given: bool) -> Finding:
     """Return what may help where no smoke is found; ``given`` as in `doubts`."""
-    if clip.mask is not None and clip.mask.files and _shows_smoke(clip.as_filmed()):
-        return Finding("smoke behind the mask", doubt=True)
+    if clip.mask is not None and clip.mask.files:
+        with suppress(ValueError):  # the camera moves
+            found = find_background(clip.as_filmed(), None, None)
+            if sample_smoke(found.clip, found.plate).smoky:
+                return Finding("smoke behind the mask", doubt=True)
     if given:
         return Finding("no smoke before the given background", doubt=True)
     if len(clip) == 1 and clip.alpha_background is None:
         return Finding("no smoke in one frame", doubt=True)
     return Finding("no smoke before an estimated background", doubt=True)
-
-
-def _shows_smoke(clip: Clip) -> bool:
-    """Whether smoke is found in a clip of which nothing is given; not if its camera moves."""
-    try:
-        found = find_background(clip, None, None)
-    except ValueError:
-        return False
-    return bool(sample_smoke(found.clip, found.plate).smoky)
 
 
 def _between_bars(samples: SmokeSamples) -> bool:

@@ -11,9 +11,8 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from smokelift.checks import Doubles
+from smokelift.checks import Array, Doubles, Mask
 from smokelift.density import DensitySettings, Observation, reconstruct_density
 from smokelift.density.hull import project_voxels, reached
 from smokelift.extraction.matte import matte
@@ -63,11 +62,11 @@ class CoarseView:
     held_out: Image
 
     @cached_property
-    def smoke(self) -> NDArray[np.bool_]:
+    def smoke(self) -> Mask:
         """Pixels (rows, columns) that show smoke."""
         return matte(self.picture, self.plate).mask
 
-    def divided(self, gain: NDArray[np.float32]) -> "CoarseView":
+    def divided(self, gain: Array) -> "CoarseView":
         """The view with its pictures and background divided by a gain (3,)."""
         plate = self.plate.through(lambda part: part / gain if part.ndim == 3 else part)
         return CoarseView(self.camera, plate, self.picture / gain, self.fitted / gain, self.held_out / gain)
@@ -143,7 +142,7 @@ def chequered(picture: Image, width: int, height: int, first: int) -> tuple[Imag
     """
     board = np.add.outer(*map(np.arange, picture.shape[:2])) % 2 == first
 
-    def average(part: NDArray[np.bool_]) -> Image:
+    def average(part: Mask) -> Image:
         filled = np.maximum(area_average(part, width, height), np.float32(1e-6))
         return np.asarray(area_average(np.where(part[..., None], picture, 0), width, height) / filled[..., None])
 

@@ -143,10 +143,7 @@ def fitting(camera: Camera, clip: Clip) -> Camera:
 
 
 def _level_camera(size: tuple[int, int], focal: float, meters: float) -> Camera:
-    """A level camera that looks along +Y at the smoke above the world's origin, where a pixel shows so many meters.
-
-    ``focal`` is in pixels.
-    """
+    """A level camera along +Y; above the world's origin a pixel shows so many meters. ``focal`` is in pixels."""
     width, height = size
     up = meters * height / 2
     matrix = np.array([[1, 0, 0, 0], [0, 0, -1, -focal * meters], [0, 1, 0, up], [0, 0, 0, 1]], np.float64)
@@ -171,10 +168,7 @@ def _directions(camera: Camera, x: Doubles, y: Doubles) -> Doubles:
 
 
 def _box_around_smoke(camera: Camera, samples: SmokeSamples, meters: float) -> tuple[Doubles, Doubles]:
-    """The upright box around the smoke where a pixel shows so many meters.
-
-    Returns the middle of its floor (3,) and its size (3,) in meters.
-    """
+    """Middle of the floor (3,) and size (3,), in meters, of the upright box around smoke whose pixels show so many."""
     distance = camera.fy * meters
     lateral, along, _ = view_frame(camera)
     eye = np.array(camera.matrix, np.float64)[:3, 3]

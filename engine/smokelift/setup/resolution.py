@@ -11,9 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.fft
-from numpy.typing import NDArray
 
-from smokelift.checks import Figures, Finding
+from smokelift.checks import Doubles, Figures, Finding
 from smokelift.extraction.matte import matte
 from smokelift.extraction.plate import Plate
 from smokelift.footage.images import linear_to_srgb
@@ -49,7 +48,7 @@ class DetailSpectrum:
     ``pixels`` of the picture lie along the longest side of the box.
     """
 
-    energy: NDArray[np.float64]
+    energy: Doubles
     pixels: float
 
     def lost(self, longest: float, finest: float | None = None) -> float:
@@ -125,7 +124,7 @@ def smoke_detail(frames: Iterable[tuple[Image, Plate]], pixels: float) -> Detail
     return DetailSpectrum(energy, pixels)
 
 
-def _beyond_noise(change: NDArray[np.float64], noise: float) -> NDArray[np.float64]:
+def _beyond_noise(change: Doubles, noise: float) -> Doubles:
     """Energy (RINGS,) of a picture, less that of white noise of a standard deviation."""
     # a cosine transform mirrors the picture at its edge, so smoke that is cut off there is no detail
     power = np.square(scipy.fft.dctn(change, norm="ortho"))

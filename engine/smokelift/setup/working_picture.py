@@ -59,8 +59,7 @@ def working_picture(camera: Camera, domain: Domain) -> WorkingPicture:
     the grid cannot show, coarser ones lose detail that it can. CameraError is raised if the picture shows no part of
     the domain.
     """
-    corners = domain.corners()
-    pixels, depth = project_points(camera, corners)
+    pixels, depth = project_points(camera, domain.corners())
     width, height = camera.size
     low, high = np.zeros(2), np.array([width, height], np.float64)
     if (depth > 0).all():
