@@ -86,8 +86,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(options: argparse.Namespace, hint: str) -> int:
-    say = reporter(getattr(options, "progress", "text"))
-    set_threads(getattr(options, "threads", 0))
+    say = reporter(options.progress)
+    set_threads(options.threads)
     try:
         try:
             with say:

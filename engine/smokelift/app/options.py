@@ -105,9 +105,14 @@ def add_run_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_sequence(parser: argparse.ArgumentParser) -> None:
+    """Add the sequence."""
+    parser.add_argument("directory", type=named_path, help="directory of the sequence")
+
+
 def add_directed_options(parser: argparse.ArgumentParser) -> None:
     """Add a sequence, and the output for a new one."""
-    parser.add_argument("directory", type=named_path, help="directory of the sequence")
+    add_sequence(parser)
     parser.add_argument("--out", type=named_path, required=True, help="directory for the new sequence")
     parser.add_argument("--npz", action="store_true", help="write NumPy files as well")
     parser.add_argument("--resume", action="store_true", help="go on after the frames that are finished")

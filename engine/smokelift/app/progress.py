@@ -17,7 +17,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from smokelift.checks import Figures, Finding, printable
 from smokelift.output.index import median_psnr, work_seconds
 from smokelift.output.sequence import Sequence
-from smokelift.report.views import message, sentence
+from smokelift.report.views import message
 
 Style = Literal["text", "json"]
 Made = TypeVar("Made")
@@ -137,10 +137,6 @@ def seconds_before(sequence: Sequence, new: Collection[int]) -> float:
     return sum(work_seconds(sequence.figures(number)) for number in sequence.frames if number not in new)
 
 
-def _words(said: Finding | str) -> str:
-    return said if isinstance(said, str) else sentence(said)
-
-
 def _fields(said: Finding | str) -> dict[str, Any]:
     return {"text": said} if isinstance(said, str) else message(said)
 
@@ -168,7 +164,7 @@ class _Text(Reporter):
 
     def note(self, said: Finding | str) -> None:
         with _output():
-            self._console.print(printable_lines(_words(said)), markup=False, soft_wrap=True)
+            self._console.print(printable_lines(_fields(said)["text"]), markup=False, soft_wrap=True)
 
     def start(self, total: int, done: int, seconds: float | None = None, shown: Shown = dict) -> None:
         with _output():

@@ -49,6 +49,9 @@ def inspection_page(shot: Shot, given: Scene, known: Sequence[Finding], findings
     seen = matte(picture, plate)
     camera = shot.scene.camera.at(number).resized(columns, rows)
     unknown = unknown_part(whole, shot.clip, number)
+    # the deviation from the background, the more orange the surer it is smoke
+    strength = np.clip(seen.deviation / MAX_SHOWN_DEVIATION, 0, 1)[..., None]
+    smoke = np.rint(strength * (255 + seen.probability[..., None] * (np.array(SMOKE) - 255))).astype(np.uint8)
     behind = eight_bit(plate.image)
     marked = behind.copy()
     marked[unknown] = np.rint(0.4 * behind[unknown] + 0.6 * np.array(HIDDEN))
@@ -60,7 +63,7 @@ def inspection_page(shot: Shot, given: Scene, known: Sequence[Finding], findings
     panels = [
         Panel(f"{frame} with the box{masked}{lit}", _with_box(shot, camera, picture, number)),
         Panel("background", behind),
-        Panel(f"smoke of {frame}: {seen.mask.mean():.1%} of the picture", _matte_picture(seen)),
+        Panel(f"smoke of {frame}: {seen.mask.mean():.1%} of the picture", smoke),
         Panel(f"unknown background: {unknown.mean():.1%} of the picture", marked),
         Panel("brightness: frame (gray), its smoke (orange), background (blue)", _histogram(picture, plate, seen)),
         *([] if path is None else [Panel("path of the box's middle while the camera moves", path)]),
@@ -115,12 +118,6 @@ def _line(draw: ImageDraw.ImageDraw, camera: Camera, points: Doubles, color: Col
         across = 0.5 * np.array([-along[1], along[0]])
         tip, base = pixels[-1], pixels[-1] - along
         draw.polygon([(float(x), float(y)) for x, y in (tip, base + across, base - across)], fill=color)
-
-
-def _matte_picture(seen: Matte) -> Tile:
-    """The deviation from the background, the more orange the surer it is smoke."""
-    strength = np.clip(seen.deviation / MAX_SHOWN_DEVIATION, 0, 1)[..., None]
-    return np.asarray(np.rint(strength * (255 + seen.probability[..., None] * (np.array(SMOKE) - 255))), np.uint8)
 
 
 def _histogram(picture: Array, plate: Plate, seen: Matte) -> Tile:

@@ -134,13 +134,9 @@ def _as_html(page: Page) -> str:
         f'<figure><figcaption>{html.escape(panel.title)}</figcaption><img alt="" src="{_data(panel.picture)}"></figure>'
         for panel in page.panels
     )
+    row = '<tr><td>{what}</td><td>{value}</td><td class="{origin}">{origin}</td><td class="how">{how}</td></tr>\n'
     lines = [{name: html.escape(words) for name, words in fact(line).items()} for line in page.facts]
-    table = "".join(
-        '<tr><td>{what}</td><td>{value}</td><td class="{origin}">{origin}</td><td class="how">{how}</td></tr>\n'.format(
-            **line
-        )
-        for line in lines
-    )
+    table = "".join(map(row.format_map, lines))
     doubts = "".join(f'<p class="warning">{html.escape(sentence(doubt))}</p>\n' for doubt in page.doubts)
     notes = "".join(f"<p>{html.escape(sentence(note))}</p>\n" for note in page.notes)
     return (

@@ -83,9 +83,7 @@ def _how_found(found: FoundBackground, bars: bool) -> list[Finding]:
             background("background partly seen", {"unknown": unknown}) if unknown else background("background seen")
         ]
     image = plate.at(0).image
-    color = image[0, 0]
-    if not (image == color).all():
-        color = np.median(image.reshape(-1, 3), axis=0)
+    color = np.median(image.reshape(-1, 3), axis=0)
     red, green, blue = map(float, color)
     figures = {"color": (red, green, blue)}
     if bars or found.source == "black for want of a picture":

@@ -119,8 +119,7 @@ def several_colors(samples: SmokeSamples) -> list[Finding]:
     Smoke of one color has that color before black, however thick it is. So what is off the color that explains most
     of the light is another color's. Clipped white shows none.
     """
-    usable = samples.colors.min(-1, initial=1.0) < CLIPPED_VALUE
-    shown = samples.colors[usable].astype(np.float64)
+    shown = samples.colors[samples.colors.min(-1, initial=1.0) < CLIPPED_VALUE].astype(np.float64)
     if len(shown) < MIN_COLOR_PIXELS or np.percentile(samples.behind.max(-1), THICK_PERCENTILE) >= MIN_COLORED_VALUE:
         return []
     if np.percentile(shown.max(-1), THICK_PERCENTILE) < MIN_COLORED_VALUE:
@@ -129,13 +128,10 @@ def several_colors(samples: SmokeSamples) -> list[Finding]:
     if off < MIN_COLOR_DEGREES:
         return []
     ends = np.cumsum(samples.counts, dtype=np.intp)[:-1]
-    frames = [
-        part[used] for part, used in zip(*(np.split(each, ends) for each in (samples.colors, usable)), strict=True)
-    ]
+    frames = [part[part.min(-1, initial=1.0) < CLIPPED_VALUE] for part in np.split(samples.colors, ends)]
     apart = [_degrees_off_one_color(frame.astype(np.float64)) for frame in frames if len(frame) >= MIN_COLOR_PIXELS]
-    kind = (
-        "smoke that changes its color" if apart and np.median(apart) < MIN_COLOR_DEGREES else "smoke of several colors"
-    )
+    changes = apart and np.median(apart) < MIN_COLOR_DEGREES
+    kind = "smoke that changes its color" if changes else "smoke of several colors"
     return [Finding(kind, {"degrees": off}, doubt=True)]
 
 

@@ -59,12 +59,9 @@ class DetailSpectrum:
         whole = float(self.energy.sum())
         if whole <= 0:
             return 0.0
-        between = self.energy[self._ring(longest) : RINGS if finest is None else self._ring(finest)]
-        return float(np.sqrt(between.sum() / whole))
-
-    def _ring(self, longest: float) -> int:
-        """The first ring that a grid of so many voxels does not show."""
-        return min(round(RINGS * longest / self.pixels), RINGS)
+        # the first rings that grids do not show; as many voxels as pixels show all
+        first, end = (min(round(RINGS * voxels / self.pixels), RINGS) for voxels in (longest, finest or self.pixels))
+        return float(np.sqrt(self.energy[first:end].sum() / whole))
 
 
 def proportional(resolution: Shape, least: int, most: int) -> list[Shape]:

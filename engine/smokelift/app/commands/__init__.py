@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 from smokelift.app.commands import batch, directed, doctor, export, extract, inspect, reconstruct, render, sequences
+from smokelift.app.options import add_sequence
 from smokelift.app.progress import Reporter
 from smokelift.output.vdb import PROXY_TIMES
 
@@ -27,14 +28,14 @@ COMMANDS: Mapping[str, Command] = {
         "say what a run would assume, choose and cost, without running it", inspect.run, inspect.add_options
     ),
     "render": Command("make an image or video of a sequence", render.run, render.add_options),
-    "check": Command("check that a sequence is complete and undamaged", sequences.check, sequences.add_sequence),
+    "check": Command("check that a sequence is complete and undamaged", sequences.check, add_sequence),
     "preview": Command(
         "make pictures and a video that show the smoke from all sides",
         sequences.preview,
         sequences.add_preview_options,
     ),
     "proxy": Command(
-        f"write copies for viewports, with voxels {PROXY_TIMES} times as large", sequences.proxy, sequences.add_sequence
+        f"write copies for viewports, with voxels {PROXY_TIMES} times as large", sequences.proxy, add_sequence
     ),
     "evaluate": Command(
         "compare the smoke with its front, known volumes and other cameras",

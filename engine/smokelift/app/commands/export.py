@@ -4,7 +4,7 @@ import argparse
 import time
 from typing import get_args
 
-from smokelift.app.options import named_path
+from smokelift.app.options import add_sequence, named_path
 from smokelift.app.progress import Reporter, say_frames
 from smokelift.checks import counted
 from smokelift.output.export import (
@@ -21,7 +21,7 @@ from smokelift.output.sequence import Sequence
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
-    parser.add_argument("directory", type=named_path, help="directory of the sequence")
+    add_sequence(parser)
     parser.add_argument("--out", type=named_path, required=True, help="folder for the export")
     parser.add_argument(
         "--precision",

@@ -3,7 +3,7 @@
 import argparse
 import math
 
-from smokelift.app.options import named_path, require_file
+from smokelift.app.options import add_sequence, named_path, require_file
 from smokelift.app.progress import Reporter
 from smokelift.output.images import VIDEO_KINDS, write_image, write_video
 from smokelift.output.sequence import Sequence
@@ -14,7 +14,7 @@ from smokelift.scene import Camera, CompleteScene, Scene, orbit
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of the command."""
-    parser.add_argument("directory", type=named_path, help="directory of the sequence")
+    add_sequence(parser)
     parser.add_argument(
         "--frame", type=int, metavar="N", help="the only frame (default: the first for an image, all for a video)"
     )

@@ -6,7 +6,7 @@ import argparse
 import json
 from dataclasses import replace
 
-from smokelift.app.options import named_path, require_file
+from smokelift.app.options import add_sequence, named_path, require_file
 from smokelift.app.progress import Reporter, say_frames
 from smokelift.checks import Finding, counted
 from smokelift.checks.whole_files import write_text
@@ -18,11 +18,6 @@ from smokelift.output.preview import write_previews
 from smokelift.output.sequence import Sequence
 from smokelift.render import device
 from smokelift.report.result import count_empty, shortcomings
-
-
-def add_sequence(parser: argparse.ArgumentParser) -> None:
-    """Add the sequence."""
-    parser.add_argument("directory", type=named_path, help="directory of the sequence")
 
 
 def check(options: argparse.Namespace, say: Reporter) -> None:
