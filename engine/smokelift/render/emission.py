@@ -8,18 +8,19 @@ linear in the picture, so that a matrix says all of it.
 """
 
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
+from scipy import ndimage, sparse
 
 from smokelift.checks import Mask
 from smokelift.render.camera_rays import BAND, camera_rays
+from smokelift.render.image import LARGEST_DEPTH
 from smokelift.render.renderer import Image, Optics, Volume
 from smokelift.scene import Camera
 from smokelift.scene.domain import LATERAL, box_around
-from smokelift.scene.projection import project_points
 
 
 def emitted(flame: Volume, density: Volume, camera: Camera, optics: Optics) -> Image:
@@ -94,18 +95,8 @@ def _samples(
 
 
 def _shows(flame: Volume, camera: Camera, optics: Optics) -> Mask:
-    """Pixels (rows, columns) that may show a flame: those before the box of its voxels."""
-    width, height = camera.size
-    domain = optics.domain
-    ends = [
-        low + np.array((side.start - 0.5, side.stop + 0.5)) * domain.voxel_size
-        for low, side in zip(domain.min, box_around(flame > 0, 0), strict=True)
-    ]
-    corners = np.stack(np.meshgrid(*ends, indexing="ij"), -1).reshape(-1, 3)
-    seen, depth = project_points(camera, corners)
-    if (depth <= 0).any():
-        return np.ones((height, width), np.bool_)
-    low, high = seen.min(0), seen.max(0)
-    x, y = np.arange(width) + 0.5, np.arange(height) + 0.5
-    across, up = (x > low[0]) & (x < high[0]), (y > low[1]) & (y < high[1])
-    return np.asarray(up[:, None] & across)
+    """Pixels (rows, columns) that may show a flame: those that it would hide if it were opaque, and their neighbors."""
+    renderer = replace(optics, scattering="absorption").renderer(camera, np.zeros(3, np.float32))
+    opaque = np.float32(LARGEST_DEPTH / (optics.medium.extinction * optics.domain.voxel_size))
+    renderer.image(np.where(flame > 0, opaque, np.float32(0)))
+    return np.asarray(ndimage.binary_dilation(renderer.transmittance < 1))
