@@ -117,7 +117,7 @@ READERS = {
     "state": Reader(
         "resume.npz",
         lambda path: ResumeState(1, VOLUME, (X, Y, Z), {"smooth": VOLUME}).write(path),
-        lambda path: ResumeState.read(path, lambda _: SHAPE),
+        lambda path: ResumeState.read(path, SHAPE),
         OSError,
     ),
     "twin": Reader(

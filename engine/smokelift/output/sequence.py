@@ -235,12 +235,9 @@ def _placed(values: Array, box: Domain, whole: Domain) -> Array:
     """The values of a box's voxels, or of its faces, in another domain; zero where the box has none."""
     if box == whole:
         return values
-    further = [count - n for count, n in zip(values.shape, box.shape, strict=True)]  # 1 along the axis of faces
-    placed: Array = np.zeros([n + more for n, more in zip(whole.shape, further, strict=True)], np.float32)
-    inner, outer = [], []
-    for start, count, room in zip(box.first_in(whole), values.shape, placed.shape, strict=True):
-        low, high = max(start, 0), min(start + count, room)
-        inner.append(slice(low - start, high - start))
-        outer.append(slice(low, high))
-    placed[tuple(outer)] = values[tuple(inner)]
-    return placed
+    missing, kept = [], []
+    for start, count, own, room in zip(box.first_in(whole), values.shape, box.shape, whole.shape, strict=True):
+        wanted = room + count - own  # one more along the axis of faces
+        missing.append((max(start, 0), max(wanted - start - count, 0)))
+        kept.append(slice(max(-start, 0), max(-start, 0) + wanted))
+    return np.ascontiguousarray(np.pad(values, missing)[tuple(kept)], np.float32)
