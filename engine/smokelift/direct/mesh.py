@@ -17,7 +17,7 @@ from scipy import ndimage
 from smokelift.checks import Doubles, Mask
 from smokelift.footage.image_sequence import is_pattern, numbered_files
 from smokelift.scene import Domain
-from smokelift.scene.checks import LARGEST, Vector
+from smokelift.scene.checks import LARGEST, Vector, set_fields
 from smokelift.transport import Array, Faces
 
 Integers = npt.NDArray[np.int64]
@@ -58,7 +58,7 @@ class Mesh:
     the last one. Of a mesh that stands still, (n, 3, 3) is enough."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "places", self.places.reshape(-1, *self.places.shape[-3:]))
+        set_fields(self, places=self.places.reshape(-1, *self.places.shape[-3:]))
 
     @staticmethod
     def read(path: Path) -> "Mesh":
