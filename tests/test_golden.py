@@ -17,7 +17,7 @@ from benchmarks.baked import FRONT, Baked
 from benchmarks.extraction.compose import Composed
 from benchmarks.extraction.score import score_element, seen_element
 from smokelift import Clip, Frame, Scene, Settings, metrics, reconstruct
-from smokelift.evaluation.frame_means import VolumeMeans, finite_mean
+from smokelift.evaluation.frame_means import finite_mean, volume_means
 from smokelift.evaluation.orbit_scores import orbit_scores
 from smokelift.evaluation.truth import Truth, resampled
 from smokelift.extraction.given_background import background_picture
@@ -122,10 +122,8 @@ def _against_truth(shot: GoldenShot, scene: CompleteScene, frames: list[Frame]) 
     """Measure beside the truth; the orbit on the grid of the reconstruction, where it costs an eighth."""
     first, last = shot.frames
     truth, smoke = Truth.load(shot.folder / "truth.npz"), Baked.load(shot.folder, last + 1, FRONT)
-    volumes = VolumeMeans(truth)
-    for number, frame in enumerate(frames, first):
-        volumes.add(number, frame.density, frame.velocity.centres())
-    means = volumes.figures()
+    volumes = ((number, frame.density, frame.velocity.centres()) for number, frame in enumerate(frames, first))
+    means = volume_means(truth, volumes)
     plate = np.broadcast_to(background_picture(scene), (*smoke.front.shape, 3))
     true = Composed(smoke.front, plate).at(range(first, last + 1))
     element = score_element(*seen_element(scene, [frame.density for frame in frames]), true)

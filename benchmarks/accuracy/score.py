@@ -18,7 +18,7 @@ from benchmarks.baked import BLACK
 from benchmarks.process import apart
 from smokelift import Scene
 from smokelift.evaluation import metrics
-from smokelift.evaluation.frame_means import VolumeMeans, eight_bit_values, finite_mean, means, picture_figures
+from smokelift.evaluation.frame_means import eight_bit_values, finite_mean, means, picture_figures, volume_means
 from smokelift.evaluation.orbit_scores import SHAPES, orbit_scores
 from smokelift.evaluation.truth import Truth, on_grid, resampled
 from smokelift.render import Image, scene_renderer
@@ -205,11 +205,8 @@ def best_gain(shown: Sequence[Image], seen: Sequence[Image]) -> float:
 
 def _volume_figures(known: KnownScene, truth: Truth, folder: Path) -> dict[str, Any]:
     """Return the figures of densities and velocities."""
-    volumes = VolumeMeans(truth)
-    for frame in known.scored:
-        arrays = _volume(folder, known, frame)
-        volumes.add(frame, arrays["density"], arrays.get("velocity"))
-    figures = volumes.figures()
+    volumes = ((frame, _volume(folder, known, frame)) for frame in known.scored)
+    figures = volume_means(truth, ((frame, held["density"], held.get("velocity")) for frame, held in volumes))
     return {name: figures.get(name) for name in VOLUME_FIGURES}
 
 

@@ -27,7 +27,7 @@ from benchmarks.tables import markdown
 from smokelift.evaluation.metrics import volume_error
 from smokelift.output.images import write_image
 from smokelift.render import Optics, Renderer
-from smokelift.render.environment import environment_lights
+from smokelift.render.environment import EnvironmentCells
 from smokelift.render.image import environment_count
 from smokelift.scene import Camera, DirectionalLight, Domain, EnvironmentLight, FiniteLight, Medium, PointLight
 
@@ -182,7 +182,7 @@ class Comparison:
     def grids(self) -> str:
         """Every light at every grid."""
         sets: dict[str, tuple[FiniteLight, ...]] = {name: (light,) for name, light in LIGHTS.items()}
-        sets["environment"] = environment_lights(self.environment, COUNTS[-1])
+        sets["environment"] = EnvironmentCells(self.environment).lights(COUNTS[-1])
         rows, worst = [], dict.fromkeys(GRIDS, 0.0)
         for name, lights in sets.items():
             for case in self.cases:
@@ -197,7 +197,7 @@ class Comparison:
         rows = []
         domain = Domain(LOW, HIGH, (grid,) * 3)
         for case in self.cases:
-            sets = [environment_lights(self.environment, count) for count in COUNTS]
+            sets = map(EnvironmentCells(self.environment).lights, COUNTS)
             cells = [f"{self.errors('environment', case, lights, grid)[0]:.2f}" for lights in sets]
             chosen = environment_count(self.environment, CAMERA, domain, self.medium(case))
             rows.append([*self.named(case), *cells, str(chosen)])

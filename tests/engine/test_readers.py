@@ -25,7 +25,7 @@ from smokelift.output.files import INDEX, checksum
 from smokelift.output.images import write_image
 from smokelift.output.index import Index, SequenceError
 from smokelift.output.resume import ResumeState
-from smokelift.render.environment import environment_lights
+from smokelift.render.environment import EnvironmentCells
 from smokelift.scene import EnvironmentLight, Inlet, Medium, Scene, SceneError, View, scene_to_dict
 from smokelift.transport import face_shapes
 from tests.engine.films import encode
@@ -117,7 +117,7 @@ READERS = {
     "state": Reader(
         "resume.npz",
         lambda path: ResumeState(1, VOLUME, (X, Y, Z), {"smooth": VOLUME}).write(path),
-        lambda path: ResumeState.read(path, lambda _: SHAPE),
+        lambda path: ResumeState.read(path, SHAPE),
         OSError,
     ),
     "twin": Reader(
@@ -130,7 +130,7 @@ READERS = {
     "truth": Reader("truth.npz", _write_truth, Truth.load, TruthError),
     **{kind: Reader(name, write, read_image, ImageError) for kind, (name, write) in PICTURES.items()},
     "environment": Reader(
-        "sky.exr", _write_exr_or_png, lambda path: environment_lights(EnvironmentLight(path), 4), ImageError
+        "sky.exr", _write_exr_or_png, lambda path: EnvironmentCells(EnvironmentLight(path)).lights(4), ImageError
     ),
 }
 """Readers by a word for what they read."""

@@ -9,6 +9,7 @@ paper's derivative is none voxel by voxel, so in thick smoke the loss falls at f
 any rate.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -89,17 +90,15 @@ class FixedRateDescent:
         _, slope = _residuals_and_gradient(renderers, pictures, thin)
         factor = np.float32(self.rate / (float(np.abs(slope).max()) or 1.0))
         enough = self.least_loss * _squares(pictures)
-        residuals, gradient = _residuals_and_gradient(renderers, pictures, density)
-        loss = _squares(residuals)
-        best, left, least, done = density, residuals, loss, 0
-        while done < self.iterations and loss > enough:
-            density = np.maximum(density - factor * gradient, 0)
+        least, done = math.inf, 0
+        while True:
             residuals, gradient = _residuals_and_gradient(renderers, pictures, density)
             loss = _squares(residuals)
-            done += 1
             if loss < least:
                 best, left, least = density, residuals, loss
-        return best, left, done
+            if loss <= enough or done >= self.iterations:
+                return best, left, done
+            density, done = np.maximum(density - factor * gradient, 0), done + 1
 
 
 @dataclass(frozen=True)

@@ -95,6 +95,12 @@ def continue_sequence(
         require_place("obstacle", obstacle, box, growth.reach())
     for fan in continuation.fans:
         require_place("fan", fan.place, box, box)
+    for turbulence in continuation.turbulences:
+        if turbulence.size < MIN_EDDY_VOXELS * box.voxel_size:
+            raise ValueError(
+                f"turbulence of {turbulence.size:g} m is too small for voxels of {box.voxel_size:.3g} m; make it "
+                f"{MIN_EDDY_VOXELS * box.voxel_size:.3g} m at least."
+            )
     # refuses what fills the box before anything is written
     _surroundings(continuation, box, growth.clip).solid(1, 1 / sequence.fps)
     last = start + continuation.frames
@@ -191,11 +197,5 @@ def _start_box(continuation: Continuation, growth: Growth) -> Domain:
 
 def _surroundings(continuation: Continuation, domain: Domain, clip: Domain) -> Surroundings:
     """What is placed in a box that the clip's has grown to."""
-    for turbulence in continuation.turbulences:
-        if turbulence.size < MIN_EDDY_VOXELS * domain.voxel_size:
-            raise ValueError(
-                f"turbulence of {turbulence.size:g} m is too small for voxels of {domain.voxel_size:.3g} m; make it "
-                f"{MIN_EDDY_VOXELS * domain.voxel_size:.3g} m at least."
-            )
     placed = continuation.wind, continuation.turbulences, continuation.fans, continuation.obstacles
     return Surroundings(domain, *placed, domain.first_in(clip))

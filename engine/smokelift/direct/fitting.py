@@ -14,7 +14,8 @@ buoyancy, since estimates err by more than that (docs/experiments/continuation.m
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -27,7 +28,7 @@ from smokelift.direct.simulation import Combustion, Physics, Simulation
 from smokelift.direct.state import SmokeState
 from smokelift.direct.surroundings import Surroundings
 from smokelift.direct.turbulence import small_eddy_speed, with_small_eddies
-from smokelift.transport import Array, advect, at_centres, project
+from smokelift.transport import Array, Velocity, advect, at_centres, project
 from smokelift.velocity.pyramid import coarsen_density, coarsen_velocity
 
 COARSE_SIDE_VOXELS = 64
@@ -136,25 +137,25 @@ def spin_up(simulation: Simulation, states: Sequence[SmokeState]) -> SmokeState:
 
     The simulation is fitted to them; what is placed around the smoke does not act yet.
     """
-    first = _first_typical(states)
-    along, velocity = _replayed(simulation), states[first].velocity
-    for step, state in enumerate(states[first:-1], first + 1):
-        velocity = along.velocity(replace(state, velocity=velocity), step)
+    ((_, velocity),) = deque(_replayed(simulation, states), maxlen=1)  # all of them are large
     with_eddies = with_small_eddies(velocity, states[-1].density, simulation.eddy_speed)
     return replace(states[-1], velocity=project(with_eddies))
 
 
-def _first_typical(states: Sequence[SmokeState]) -> int:
-    """The first state whose velocity is as fast as usual: a wrong one would go on through all others."""
+def _replayed(simulation: Simulation, states: Sequence[SmokeState]) -> Iterator[tuple[int, Velocity]]:
+    """The velocities that the forces make along the states, each with the number of the state that it leads to.
+
+    The first velocity that is as fast as usual is the start: a wrong one would go on through all others. What entered
+    in the clip enters.
+    """
     speeds = [sum(float(np.vdot(component, component)) for component in m.velocity.faces) ** 0.5 for m in states]
     usual = MAX_SPEED_RATIO * float(np.median(speeds))
-    return next((number for number in range(len(states) // 2) if speeds[number] <= usual), 0)
-
-
-def _replayed(simulation: Simulation) -> Simulation:
-    """The simulation of the clip itself: step n goes to state n, and what entered then enters."""
+    first = next((number for number in range(len(states) // 2) if speeds[number] <= usual), 0)
     inflow = replace(simulation.inflow, states=simulation.inflow.states[::-1])
-    return Simulation(simulation.physics, inflow, Surroundings(), simulation.dt)
+    along, velocity = Simulation(simulation.physics, inflow, Surroundings(), simulation.dt), states[first].velocity
+    for number, state in enumerate(states[first:-1], first + 1):
+        velocity = along.velocity(replace(state, velocity=velocity), number)
+        yield number, velocity
 
 
 def _buoyancy(states: Sequence[SmokeState], dt: float, inlets: Mask, depth_axis: int) -> tuple[float, float]:
@@ -168,7 +169,7 @@ def _buoyancy(states: Sequence[SmokeState], dt: float, inlets: Mask, depth_axis:
     states = states[-BUOYANCY_FRAMES:]
     if len(states) < MIN_BUOYANCY_FRAMES or not all(state.density.any() for state in states):
         return 0.0, 0.0
-    half, first = len(states) // 2, _first_typical(states)
+    half = len(states) // 2
     unforced = Simulation(Physics(0.0, 0.0), Inflow(inlets, states).cropped(), Surroundings(), dt)
     compared = (~ndimage.binary_dilation(inlets, iterations=INLET_MARGIN)).astype(np.float32)
     compared[:, :, :BORDER_LAYERS] = compared[:, :, -BORDER_LAYERS:] = 0
@@ -177,17 +178,16 @@ def _buoyancy(states: Sequence[SmokeState], dt: float, inlets: Mask, depth_axis:
         return np.asarray(ndimage.gaussian_filter((density * compared).sum(depth_axis), BLUR))
 
     found = [picture(state.density) for state in states]
-
     rise = float(np.mean([_rise(state, compared) for state in states]))
 
     def excess_rise(buoyancy: float) -> float:
         """Voxels per frame by which the carried smoke rises more than the clip's."""
-        along = _replayed(replace(unforced, physics=Physics(buoyancy, 0.0)))
-        velocity, carried = states[first].velocity, []
-        for step, before in enumerate(states[first:-1], first + 1):
-            velocity = along.velocity(replace(before, velocity=velocity), step)
-            if step >= half:
-                carried.append(picture(advect(before.density, velocity, dt, conserve=True)))
+        forced = replace(unforced, physics=Physics(buoyancy, 0.0))
+        carried = [
+            picture(advect(states[number - 1].density, velocity, dt, conserve=True))
+            for number, velocity in _replayed(forced, states)
+            if number >= half
+        ]
         return _vertical_shift(carried, found[half:], rise)
 
     density = states[half].density

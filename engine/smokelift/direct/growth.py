@@ -139,13 +139,9 @@ def dissolve(state: SmokeState, stopped: tuple[Side, ...], dt: float, first: tup
     So it is gone there however fast it arrives, what does not move towards it stays, and its end is not straight. The
     box begins at the voxel `first` of the clip's: the bumps stay where they are when the box grows.
     """
-    if not stopped:
-        return state
-    left = np.ones((), np.float32)
-    shape = state.density.shape
-    for side, axis, is_high in open_sides(()):
-        if side not in stopped:
-            continue
+    left, shape = np.ones((), np.float32), state.density.shape
+    for side in stopped:
+        axis, is_high = divmod(SIDES.index(side), 2)
         count, band = shape[axis], np.float32(FADE * shape[axis])
         inside = np.arange(count, dtype=np.float32).reshape([-1 if d == axis else 1 for d in range(3)])
         distance = (count - 1 - inside if is_high else inside) - BUMPS * band * _bumps(shape, axis, float(band), first)
@@ -171,7 +167,7 @@ def _bumps(shape: tuple[int, ...], axis: int, width: float, first: tuple[int, ..
 
 def _moved(box: Domain, side: Side, blocks: int) -> Domain:
     """A box one side of which has moved outwards by blocks, a high one less where that makes the count whole blocks."""
-    axis, is_high = SIDES.index(side) // 2, SIDES.index(side) % 2
+    axis, is_high = divmod(SIDES.index(side), 2)
     ends = [[0, 0, 0], [0, 0, 0]]
     ends[is_high][axis] = blocks * BLOCK + (-box.resolution[axis] % BLOCK if is_high else 0)
     return box.grown(tuple(ends[0]), tuple(ends[1]))

@@ -113,9 +113,7 @@ def find_inflow(states: Sequence[SmokeState], dt: float, marked: Mask | None = N
     Inlets that are known are marked (nx, ny, nz); otherwise they are found from what the velocities do not explain.
     """
     voxels = _detect_inlets(states, dt) if marked is None else marked
-    if voxels.any():
-        voxels = ndimage.binary_dilation(voxels, ndimage.generate_binary_structure(3, 3), MARGIN_VOXELS)
-    return Inflow(voxels, states)
+    return Inflow(ndimage.binary_dilation(voxels, np.ones((3, 3, 3)), MARGIN_VOXELS), states)
 
 
 def _detect_inlets(states: Sequence[SmokeState], dt: float) -> Mask:

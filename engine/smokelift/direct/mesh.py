@@ -17,7 +17,7 @@ from scipy import ndimage
 from smokelift.checks import Doubles, Mask
 from smokelift.footage.image_sequence import is_pattern, numbered_files
 from smokelift.scene import Domain
-from smokelift.scene.checks import LARGEST, Vector
+from smokelift.scene.checks import LARGEST, Vector, set_fields
 from smokelift.transport import Array, Faces
 
 Integers = npt.NDArray[np.int64]
@@ -58,7 +58,7 @@ class Mesh:
     the last one. Of a mesh that stands still, (n, 3, 3) is enough."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "places", self.places.reshape(-1, *self.places.shape[-3:]))
+        set_fields(self, places=self.places.reshape(-1, *self.places.shape[-3:]))
 
     @staticmethod
     def read(path: Path) -> "Mesh":
@@ -183,20 +183,12 @@ def _crossings(places: Doubles, shape: tuple[int, ...]) -> Crossings:
     none = np.empty(0, np.int64)
     found = [Crossings(none, none, none, none, np.empty((0, 3)))]
     for number in np.unique(batch):
-        triangle, column = _pairs(near[batch == number], low, size)
+        among = near[batch == number]
+        triangle = np.repeat(among, counts[among])  # once for every column of its rectangle
+        within = np.arange(len(triangle)) - np.repeat(np.cumsum(counts[among]) - counts[among], counts[among])
+        column = low[triangle] + np.stack(np.divmod(within, size[triangle, 1]), axis=-1)
         found.append(_crossed(places[triangle], triangle, column, shape))
     return Crossings(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
-
-
-def _pairs(triangles: Integers, low: Integers, size: Integers) -> tuple[Integers, Integers]:
-    """Triangles (m,) by number, each with every column of a rectangle, as numbers (k,) and columns' places (k, 2).
-
-    `low` and `size` (n, 2) are the first column of each triangle's rectangle, and how many it has along both axes.
-    """
-    counts = size[triangles].prod(axis=1)
-    triangle = np.repeat(triangles, counts)
-    within = np.arange(len(triangle)) - np.repeat(np.cumsum(counts) - counts, counts)
-    return triangle, low[triangle] + np.stack(np.divmod(within, size[triangle, 1]), axis=-1)
 
 
 def _crossed(corners: Doubles, triangle: Integers, column: Integers, shape: tuple[int, ...]) -> Crossings:
@@ -216,7 +208,7 @@ def _crossed(corners: Doubles, triangle: Integers, column: Integers, shape: tupl
     )
 
 
-def _side(start: Doubles, end: Doubles, point: npt.NDArray[np.int64]) -> tuple[Doubles, Mask]:
+def _side(start: Doubles, end: Doubles, point: Integers) -> tuple[Doubles, Mask]:
     """Twice the area of edges (n, 2) with a point, and whether it is on their left.
 
     Two triangles that share an edge find the same, so that a column on it crosses one of them.

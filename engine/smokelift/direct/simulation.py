@@ -55,11 +55,6 @@ class Combustion:
     feed: Array
     """(nx, ny, nz): emission that a step adds."""
 
-    def after(self, advected: Array, solid: Mask | None) -> Array:
-        """The emission (nx, ny, nz) after a step, from the advected one; zero in obstacles."""
-        emission = np.float32(self.remaining) * advected + self.feed
-        return emission if solid is None else np.where(solid, np.float32(0), emission)
-
 
 @dataclass(frozen=True, eq=False)
 class Simulation:
@@ -88,7 +83,10 @@ class Simulation:
         self.inflow.density_into(density, step, obstacle)
         flame = None
         if self.fire is not None and state.flame is not None:
-            flame = self.fire.after(self._advected(state.flame, velocity, obstacle), obstacle)
+            carried = self._advected(state.flame, velocity, obstacle)
+            flame = np.float32(self.fire.remaining) * carried + self.fire.feed
+            if obstacle is not None:
+                flame[obstacle] = 0
         return SmokeState(density, velocity, flame)
 
     def velocity(self, state: SmokeState, step: int, solid: Solid | None = None) -> Velocity:

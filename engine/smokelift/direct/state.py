@@ -8,7 +8,7 @@ import numpy as np
 from smokelift.checks import Mask
 from smokelift.output.sequence import Sequence
 from smokelift.transport import Array, Velocity, advect, divergence, on_faces, project
-from smokelift.transport.constraint import FaceMasks, project_with_given_faces
+from smokelift.transport.constraint import project_with_given_faces
 
 Mix = Callable[[Array, Array, float], Array]
 """Mixes two densities or emissions by a fraction: 0 gives the first."""
@@ -50,11 +50,14 @@ def complete_velocity(velocity: Velocity) -> Velocity:
     """The velocity without divergence that is nearest to one that is known near smoke alone, and zero elsewhere.
 
     Files keep the velocity near smoke. Cut off there it has divergence, and projecting that would slow the smoke down;
-    so the air around is set in motion instead. A velocity without divergence stays as it is.
+    so the air around is set in motion instead, and faces both of whose voxels have a velocity keep theirs. A velocity
+    without divergence stays as it is.
     """
     if largest_divergence(velocity) <= DIVERGENCE_TOLERANCE:
         return velocity
-    found = project_with_given_faces(velocity, _known(velocity), velocity.faces, limit=COMPLETION_ITERATIONS)
+    known = velocity.centres().any(axis=-1, keepdims=True).astype(np.float32)
+    x, y, z = (both == 1 for both in on_faces(np.broadcast_to(known, (*velocity.shape, 3))))
+    found = project_with_given_faces(velocity, (x, y, z), velocity.faces, limit=COMPLETION_ITERATIONS)
     return velocity.with_faces(found.faces)
 
 
@@ -65,13 +68,6 @@ def largest_divergence(velocity: Velocity, solid: Mask | None = None) -> float:
     if solid is not None:
         left = left[~solid]
     return float(left.max()) * velocity.voxel_size / largest if largest > 0 else 0.0
-
-
-def _known(velocity: Velocity) -> FaceMasks:
-    """The faces both of whose voxels have a velocity."""
-    known = velocity.centres().any(axis=-1, keepdims=True).astype(np.float32)
-    x, y, z = (both == 1 for both in on_faces(np.broadcast_to(known, (*velocity.shape, 3))))
-    return x, y, z
 
 
 def blend(a: Array, b: Array, fraction: float) -> Array:

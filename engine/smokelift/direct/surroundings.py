@@ -12,7 +12,7 @@ from smokelift.direct.mesh import Mesh
 from smokelift.direct.turbulence import Turbulence
 from smokelift.scene import Box, Domain
 from smokelift.scene.checks import Vector
-from smokelift.transport import Array, Faces, Velocity, divergence, face_shapes, outflow
+from smokelift.transport import Array, Faces, Velocity, divergence, outflow
 from smokelift.transport.constraint import FaceMasks, faces_between, faces_of, project_with_given_faces
 
 RISE_SECONDS = 0.5
@@ -90,13 +90,6 @@ class Solid(NamedTuple):
         )
 
 
-def _with(solid: Solid, voxels: Mask, velocity: Faces) -> Solid:
-    """What is solid with a thing that moves."""
-    before = solid.velocity or [np.zeros(shape, np.float32) for shape in face_shapes(voxels.shape)]
-    x, y, z = (np.where(mask, own, other) for mask, own, other in zip(faces_of(voxels), velocity, before, strict=True))
-    return Solid(solid.voxels | voxels, (x, y, z))
-
-
 def require_place(what: str, thing: Obstacle, domain: Domain, reach: Box) -> None:
     """Refuse a thing of that name that no smoke can meet, or a mesh that is open.
 
@@ -164,13 +157,16 @@ class Surroundings:
         """What is solid after so many steps of `dt` seconds; None if nothing is, ValueError if it fills the box."""
         if self.domain is None or not self.obstacles:
             return None
-        solid = Solid(self._at_rest, None)
+        voxels, velocity = self._at_rest, None
         for obstacle in self.obstacles:
             if isinstance(obstacle, Mesh) and obstacle.moves:
-                solid = _with(solid, *obstacle.solid(self.domain, step, dt))
-        if solid.voxels.all():
+                inside, speeds = obstacle.solid(self.domain, step, dt)
+                others = velocity or tuple(map(np.zeros_like, speeds))
+                x, y, z = (np.where(*three) for three in zip(faces_of(inside), speeds, others, strict=True))
+                voxels, velocity = voxels | inside, (x, y, z)
+        if voxels.all():
             raise ValueError("the obstacles fill the whole box; make them smaller.")
-        return solid if solid.voxels.any() else None
+        return Solid(voxels, velocity) if voxels.any() else None
 
     @cached_property
     def _at_rest(self) -> Mask:

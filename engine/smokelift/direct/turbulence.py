@@ -87,7 +87,7 @@ EDGE_VOXELS = 5
 
 def small_eddy_speed(states: Sequence[SmokeState]) -> float:
     """The speed in m/s, root mean square of each component, that eddies of each of `SIZES` should have in a clip."""
-    squares = [sum(_mean_squares(at_centres(m.velocity.faces), [_in_smoke(m.density)] * 3)) for m in states]
+    squares = [_mean_square(at_centres(m.velocity.faces), [_in_smoke(m.density)] * 3) for m in states]
     return INTENSITY * math.sqrt(float(np.median(squares)))
 
 
@@ -102,7 +102,7 @@ def with_small_eddies(velocity: Velocity, density: Array, speed: float, step: in
     soft = ndimage.uniform_filter(smoke, EDGE_VOXELS)
     inside, near = (on_faces(np.stack([each] * 3, -1)) for each in (smoke, soft))
     for number, (size, found) in enumerate(_octaves(velocity)):
-        missing = 3 * speed**2 - sum(_mean_squares(found, inside))
+        missing = 3 * speed**2 - _mean_square(found, inside)
         if missing > 0:
             eddies = Turbulence(missing**0.5, size * velocity.voxel_size, step * len(SIZES) + number)
             added = eddies.velocity(velocity, 0.0)
@@ -125,9 +125,9 @@ def _in_smoke(density: Array) -> Array:
     return np.asarray((density > MIN_DENSITY_FRACTION * density.max()).astype(np.float32))
 
 
-def _mean_squares(components: Sequence[Array], weights: Sequence[Array]) -> list[float]:
-    """Mean squares of components with weights; 0 where there is no weight."""
-    return [
+def _mean_square(components: Sequence[Array], weights: Sequence[Array]) -> float:
+    """The mean square of a vector by its components, each with weights; 0 where there is no weight."""
+    return sum(
         float(np.vdot(w, np.square(u))) / max(float(w.sum(dtype=np.float64)), 1e-30)
         for u, w in zip(components, weights, strict=True)
-    ]
+    )

@@ -1,5 +1,6 @@
 """How near a sequence is to known volumes and other cameras' clips, and whether it looks like smoke from all around."""
 
+from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -7,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from smokelift.checks import counted
-from smokelift.evaluation.frame_means import Figures, VolumeMeans, means, picture_figures
+from smokelift.evaluation.frame_means import Figures, means, picture_figures, volume_means
 from smokelift.evaluation.orbit import Orbit
 from smokelift.evaluation.orbit_scores import orbit_scores
 from smokelift.evaluation.reference_view import ReferenceView, first_frame, open_views
@@ -79,7 +80,7 @@ def evaluate(
         # the truth is known in the clip's box, which smoke that goes on may have left
         sequence = sequence.within(sequence.box(sequence.frames[0]))
         truth = _load_truth(sequence, truth_path)
-        figures["truth"] = {"path": str(truth_path), **_against_truth(sequence, truth)}
+        figures["truth"] = {"path": str(truth_path), **volume_means(truth, _volumes(sequence))}
     with ExitStack() as stack:
         views = open_views(whole, view_paths, stack, figures["notes"])
         if view_paths or truth is None:
@@ -130,13 +131,12 @@ def _true_density(sequence: Sequence, truth: Truth, number: int) -> Volume:
     return truth.density(number + first_frame(sequence) - 1)
 
 
-def _against_truth(sequence: Sequence, truth: Truth) -> Figures:
-    volumes = VolumeMeans(truth)
+def _volumes(sequence: Sequence) -> Iterator[tuple[int, Volume, Volume | None]]:
+    """The frames as `volume_means` takes them."""
     for number in sequence.frames:
         # the first frame's velocity is the second's
         velocity = sequence.velocity_at_centres(number) if number > sequence.frames[0] else None
-        volumes.add(number + first_frame(sequence) - 1, sequence.density(number), velocity)
-    return volumes.figures()
+        yield number + first_frame(sequence) - 1, sequence.density(number), velocity
 
 
 def _against_view(sequence: Sequence, view: ReferenceView) -> Figures:

@@ -32,21 +32,16 @@ def picture_figures(image: Image, truth: Image) -> Figures:
     return {"psnr": metrics.psnr(found, true), "ssim": metrics.ssim(found, true)}
 
 
-class VolumeMeans:
-    """Densities and velocities beside the true ones, on the truth's grid."""
+def volume_means(truth: Truth, volumes: Iterable[tuple[int, Volume, Array | None]]) -> Figures:
+    """Means over frames of the metrics of densities and velocities beside the true ones, on the truth's grid.
 
-    def __init__(self, truth: Truth) -> None:
-        self._truth = truth
-        self._frames: list[Figures] = []
-        self._before: tuple[int, Volume] | None = None
-
-    def add(self, frame: int, density: Volume, velocity: Array | None = None) -> Figures:
-        """Add a frame of the truth, from 0, in order, and return its own metrics.
-
-        The density (nx, ny, nz) has any resolution over the truth's box. The velocity (nx, ny, nz, 3), in m/s at the
-        voxels' centers, is of the smoke that arrives in this frame; it is compared from the second frame on.
-        """
-        truth = self._truth
+    Each volume is a frame of the truth, from 0, in order, with its density (nx, ny, nz), of any resolution over the
+    truth's box, and the velocity (nx, ny, nz, 3), in m/s at the voxels' centers, of the smoke that arrives in it. This
+    is compared from the second frame on.
+    """
+    frames: list[Figures] = []
+    before: tuple[int, Volume] | None = None
+    for frame, density, velocity in volumes:
         found, true = resampled(density, truth.shape), truth.density(frame)
         figures: Figures = {
             "density_error": metrics.volume_error(found, true),
@@ -54,40 +49,36 @@ class VolumeMeans:
             "mass_ratio": float(found.sum(dtype=float) / max(true.sum(dtype=float), 1e-30)),
         }
         smoke = true > SMOKE_FRACTION * true.max()
-        before, self._before = self._before, (frame, found)
         if velocity is not None and before is not None and before[0] == frame - 1 and smoke.any():
-            figures |= self._motion(frame, before[1], found, resampled(velocity, truth.shape), smoke)
-        self._frames.append(figures)
-        return figures
+            figures |= _motion_figures(truth, frame, before[1], found, resampled(velocity, truth.shape), smoke)
+        frames.append(figures)
+        before = frame, found
+    return means(frames)
 
-    def _motion(
-        self, frame: int, before: Volume, after: Volume, velocity: Array, smoke: npt.NDArray[np.bool_]
-    ) -> Figures:
-        """Metrics of what moves the density of the frame before into this one's, at the points of arrival."""
-        truth = self._truth
-        true_velocity = truth.velocity(frame - 1).centres()
-        free = ~(truth.inflow(frame - 1) | truth.inflow(frame))
-        inside, around = smoke & free, ndimage.binary_dilation(smoke, iterations=SURROUNDING_VOXELS) & free
-        if not ndimage.binary_erosion(inside, np.ones((2, 2, 2))).any():
-            return {}  # too little smoke for a divergence
-        error, cosine = metrics.velocity_error(velocity, true_velocity, inside)
-        error_around, cosine_around = metrics.velocity_error(velocity, true_velocity, around)
-        densities = truth.density(frame - 1), truth.density(frame)
-        voxels = truth.dt / truth.voxel_size
-        return {
-            "velocity_error": error,
-            "velocity_cosine": cosine,
-            "velocity_error_around": error_around,
-            "velocity_cosine_around": cosine_around,
-            "divergence": truth.dt * metrics.mean_divergence(velocity, truth.voxel_size, inside),
-            "divergence_truth": truth.dt * metrics.mean_divergence(true_velocity, truth.voxel_size, inside),
-            "warp_error": metrics.warp_error(before, after, velocity * voxels, free),
-            "warp_error_truth": metrics.warp_error(*densities, true_velocity * voxels, free),
-        }
 
-    def figures(self) -> Figures:
-        """Means over the frames."""
-        return means(self._frames)
+def _motion_figures(
+    truth: Truth, frame: int, before: Volume, after: Volume, velocity: Array, smoke: npt.NDArray[np.bool_]
+) -> Figures:
+    """Metrics of what moves the density of the frame before into this one's, at the points of arrival."""
+    true_velocity = truth.velocity(frame - 1).centres()
+    free = ~(truth.inflow(frame - 1) | truth.inflow(frame))
+    inside, around = smoke & free, ndimage.binary_dilation(smoke, iterations=SURROUNDING_VOXELS) & free
+    if not ndimage.binary_erosion(inside, np.ones((2, 2, 2))).any():
+        return {}  # too little smoke for a divergence
+    error, cosine = metrics.velocity_error(velocity, true_velocity, inside)
+    error_around, cosine_around = metrics.velocity_error(velocity, true_velocity, around)
+    densities = truth.density(frame - 1), truth.density(frame)
+    voxels = truth.dt / truth.voxel_size
+    return {
+        "velocity_error": error,
+        "velocity_cosine": cosine,
+        "velocity_error_around": error_around,
+        "velocity_cosine_around": cosine_around,
+        "divergence": truth.dt * metrics.mean_divergence(velocity, truth.voxel_size, inside),
+        "divergence_truth": truth.dt * metrics.mean_divergence(true_velocity, truth.voxel_size, inside),
+        "warp_error": metrics.warp_error(before, after, velocity * voxels, free),
+        "warp_error_truth": metrics.warp_error(*densities, true_velocity * voxels, free),
+    }
 
 
 def means(frames: Sequence[Figures]) -> Figures:

@@ -177,20 +177,15 @@ def shape_means(frames: Iterable[list[RayShapes | None]], ending: str = "") -> d
 
     The frames are `azimuth_shapes`.
     """
-    azimuths = list(zip(*frames, strict=True))
-    by_azimuth = {name: [_mean(shapes, name) for shapes in azimuths] for name in SHAPES}
-    front = [shape for shape in azimuths[0] if shape is not None]
+    known = [[shape for shape in shapes if shape is not None] for shapes in zip(*frames, strict=True)]
+    by_azimuth = {name: [finite_mean(getattr(shape, name) for shape in shapes) for shapes in known] for name in SHAPES}
     return {
         **{f"{name}{ending}": values[0] for name, values in by_azimuth.items()},
         **{f"{name}{ending}_by_azimuth": values for name, values in by_azimuth.items()},
         f"depth_over_width{ending}_by_height": [
-            finite_mean(_band_ratio(shape, band) for shape in front) for band in range(BANDS)
+            finite_mean(_band_ratio(shape, band) for shape in known[0]) for band in range(BANDS)
         ],
     }
-
-
-def _mean(shapes: Iterable[RayShapes | None], name: str) -> float | None:
-    return finite_mean(getattr(shape, name) for shape in shapes if shape is not None)
 
 
 def _band_ratio(shape: RayShapes, band: int) -> float | None:

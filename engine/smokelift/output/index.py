@@ -110,8 +110,9 @@ class Index:
 
     def write(self, directory: Path) -> None:
         """Write the file; OSError if that fails."""
-        parts = {name: _json(value) for name, value in {"format": FORMAT, **vars(self)}.items()}
-        parts["frames"] = _lines({number: _json(figures) for number, figures in self.frames.items()})
+        # with indents the encoder is many times slower, and every frame is written anew
+        parts = {name: json.dumps(value, allow_nan=False) for name, value in {"format": FORMAT, **vars(self)}.items()}
+        parts["frames"] = _lines({number: json.dumps(figures) for number, figures in self.frames.items()})
         write_text(directory / INDEX, _lines(parts) + "\n")
 
     @staticmethod
@@ -154,11 +155,6 @@ def median_psnr(figures: Iterable[Mapping[str, Any]]) -> float | None:
     """Return the median ``psnr`` (dB) of frames; None if none has one."""
     decibels = [of_frame["psnr"] for of_frame in figures if of_frame.get("psnr") is not None]
     return median(decibels) if decibels else None
-
-
-def _json(value: Any) -> str:
-    """A value as JSON, in one line: with indents the encoder is many times slower, and every frame is written anew."""
-    return json.dumps(value, allow_nan=False)
 
 
 def _lines(values: Mapping[str, str]) -> str:

@@ -1,7 +1,7 @@
 """What an unfinished run needs to go on: its last frame at full precision, which OpenVDB's 16 bits do not hold."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -47,15 +47,8 @@ class ResumeState:
         return int(read_arrays(path, {"number": ()})["number"]) if path.is_file() else None
 
     @staticmethod
-    def read(path: Path, shape_of: Callable[[int], tuple[int, int, int]]) -> "ResumeState | None":
-        """Read the state, or return None if no frame was finished; OSError if the file is damaged.
-
-        `shape_of` gives the voxels of a frame, by its number.
-        """
-        last = ResumeState.last_number(path)
-        if last is None:
-            return None
-        shape = shape_of(last)
+    def read(path: Path, shape: tuple[int, int, int]) -> "ResumeState":
+        """Read the state of a frame of so many voxels; OSError if there is none, or the file is damaged."""
         arrays = read_arrays(
             path,
             {"number": (), **dict.fromkeys(VELOCITY)},

@@ -16,7 +16,7 @@ from smokelift.output.vdb import read_grid
 from smokelift.output.viewer import Viewer
 from smokelift.render import Image
 from smokelift.scene import Camera, CompleteScene, Domain, completed, scene_from_dict
-from smokelift.transport import Array, Velocity, face_shapes, on_faces
+from smokelift.transport import Array, Velocity, at_centres, face_shapes, on_faces
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,7 @@ class Sequence:
 
     def density(self, number: int) -> Array:
         """Return the density of a frame, shape (nx, ny, nz): the NumPy twin's if there is one."""
-        density = self._read(number, ("density",))["density"]
+        (density,) = self._read(number, "density")
         if density.min() < 0:
             raise SequenceError(f"{self.directory}: frame {number} holds negative densities; write it again")
         return density
@@ -126,7 +126,7 @@ class Sequence:
         self._check(number)
         if self.scene.medium.flame_color is None:  # the clip shows no fire: the file need not be read again
             return None
-        flame = self._read(number, (FLAME,)).get(FLAME)
+        flame = next(iter(self._read(number, FLAME)), None)
         if flame is not None and flame.min() < 0:
             raise SequenceError(f"{self.directory}: frame {number} holds a negative emission")
         return flame
@@ -137,11 +137,8 @@ class Sequence:
         It is the NumPy twin's; from an OpenVDB file it is the mean of the values at the centers beside a face, zero
         further than two voxels from smoke and not free of divergence.
         """
-        arrays = self._read(number, VELOCITY)
-        if "velocity" in arrays:
-            x, y, z = on_faces(arrays["velocity"])
-        else:
-            x, y, z = (arrays[name] for name in VELOCITY)
+        found = self._read(number, "velocity")
+        x, y, z = found if len(found) == 3 else on_faces(*found)
         return Velocity((x, y, z), self.scene.domain.voxel_size, self.scene.closed)
 
     def velocity_at_centres(self, number: int) -> Array:
@@ -150,8 +147,8 @@ class Sequence:
         These are the values of an OpenVDB file as it holds them; those of :meth:`velocity` are smoothed by the way to
         faces and back.
         """
-        arrays = self._read(number, VELOCITY)
-        return arrays["velocity"] if "velocity" in arrays else self.velocity(number).centres()
+        found = self._read(number, "velocity")
+        return found[0] if len(found) == 1 else np.stack(at_centres((found[0], found[1], found[2])), -1)
 
     def files(self, number: int) -> Mapping[str, Path]:
         """Return the files of a frame by their kind, ``"vdb"`` or ``"npz"``."""
@@ -198,8 +195,8 @@ class Sequence:
                 f"{path}: is not the file that was written: it is damaged, or was changed since; copy or make it again"
             )
 
-    def _read(self, number: int, names: tuple[str, ...]) -> Mapping[str, Array]:
-        """Arrays of a NumPy twin, or else the OpenVDB grid that holds the same; emission where it is there."""
+    def _read(self, number: int, name: str) -> list[Array]:
+        """The grid of that name, empty if it is of an emission that is not there; a NumPy twin's velocity on faces."""
         self._check(number)
         twin, grids = (frame_path(self.directory, self.file_number(number), kind) for kind in ("npz", "vdb"))
         whole, box = self.scene.domain, self._boxes[int(number)]
@@ -209,17 +206,19 @@ class Sequence:
         try:
             self._check_sum(path)
             if path is twin:
-                shapes = {"density": box.shape, **dict(zip(VELOCITY, face_shapes(box.shape), strict=True))}
-                others = {FLAME: box.shape} if FLAME in names else None
-                arrays = read_arrays(path, {name: shapes[name] for name in names if name != FLAME}, others=others)
-                return {name: _placed(values, box, whole) for name, values in arrays.items()}
-            name = "velocity" if names == VELOCITY else names[0]
+                if name == "velocity":
+                    arrays = read_arrays(path, dict(zip(VELOCITY, face_shapes(box.shape), strict=True)))
+                elif name == FLAME:
+                    arrays = read_arrays(path, {}, others={FLAME: box.shape})
+                else:
+                    arrays = read_arrays(path, {name: box.shape})
+                return [_placed(values, box, whole) for values in arrays.values()]
             values = read_grid(path, name, whole)
         except OSError as error:
             raise SequenceError(str(error)) from error
         if values is None and name != FLAME:
             raise SequenceError(f"{path}: lacks {name}")
-        return {} if values is None else {name: values}
+        return [] if values is None else [values]
 
 
 def box_around_all(domain: Domain, boxes: Iterable[Domain]) -> Domain:
@@ -236,12 +235,9 @@ def _placed(values: Array, box: Domain, whole: Domain) -> Array:
     """The values of a box's voxels, or of its faces, in another domain; zero where the box has none."""
     if box == whole:
         return values
-    further = [count - n for count, n in zip(values.shape, box.shape, strict=True)]  # 1 along the axis of faces
-    placed: Array = np.zeros([n + more for n, more in zip(whole.shape, further, strict=True)], np.float32)
-    inner, outer = [], []
-    for start, count, room in zip(box.first_in(whole), values.shape, placed.shape, strict=True):
-        low, high = max(start, 0), min(start + count, room)
-        inner.append(slice(low - start, high - start))
-        outer.append(slice(low, high))
-    placed[tuple(outer)] = values[tuple(inner)]
-    return placed
+    missing, kept = [], []
+    for start, count, own, room in zip(box.first_in(whole), values.shape, box.shape, whole.shape, strict=True):
+        wanted = room + count - own  # one more along the axis of faces
+        missing.append((max(start, 0), max(wanted - start - count, 0)))
+        kept.append(slice(max(-start, 0), max(-start, 0) + wanted))
+    return np.ascontiguousarray(np.pad(values, missing)[tuple(kept)], np.float32)

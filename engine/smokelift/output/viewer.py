@@ -36,7 +36,7 @@ class Viewer:
         """
         frame = number - 1 if self._moves else 0
         if frame not in self._renderers:
-            renderer = self._optics.renderer(self._camera.at(frame), self._behind(frame))
+            renderer = self._optics.renderer(self._camera.at(frame), self.background(frame + 1))
             self._renderers = {frame: renderer}
         image = self._renderers[frame].image(density)
         color = self._scene.medium.flame_color
@@ -47,11 +47,9 @@ class Viewer:
 
     def background(self, number: int) -> Image:
         """What is behind the smoke in a frame, from 1; linear radiance (rows, columns, 3) or (3,)."""
-        return self._behind(number - 1)
-
-    def _behind(self, frame: int) -> Image:
         if self._given is not None:
             return self._given
+        frame = number - 1
         own, camera = self._scene.camera.at(frame), self._camera.at(frame)
         if self._plates is None or shared_part(own, camera) is None:
             return self._steady

@@ -211,11 +211,13 @@ class SequenceWriter:
             leftover.unlink(missing_ok=True)
 
     def _last_state(self, there: Index) -> ResumeState | None:
-        def shape_of(number: int) -> tuple[int, int, int]:
-            return there.box(number, self._domain).shape if str(number) in there.frames else self._domain.shape
-
+        path = self.directory / files.RESUME
         try:
-            return ResumeState.read(self.directory / files.RESUME, shape_of)
+            last = ResumeState.last_number(path)
+            if last is None:
+                return None
+            box = there.box(last, self._domain) if str(last) in there.frames else self._domain
+            return ResumeState.read(path, box.shape)
         except OSError as error:
             raise _not_resumable(error) from error
 

@@ -5,8 +5,6 @@ directions, and conjugate gradients solve for all orders of scattering. What the
 sharp shadows, stays on the voxels. Figures: docs/experiments/scattering.md.
 """
 
-from collections.abc import Sequence
-
 import numpy as np
 
 import smokelift._core as _core
@@ -31,10 +29,11 @@ class DiffuseLight:
         self._support = support
         albedos = plan.medium.albedos
         self._albedo = max(albedos)
-        # gray smoke scatters all channels alike, whatever colors they are
-        whole = slice(0, FIELDS * plan.channels)
-        self._alike = [(self._albedo, whole)] if plan.medium.is_gray else _channels(albedos)
-        relative = np.ones(plan.channels) if plan.medium.is_gray else np.array(albedos) / self._albedo
+        if plan.medium.is_gray:  # it scatters all channels alike, whatever colors they are
+            self._alike, relative = [(self._albedo, slice(0, FIELDS * plan.channels))], np.ones(plan.channels)
+        else:
+            self._alike = [(albedo, slice(FIELDS * n, FIELDS * (n + 1))) for n, albedo in enumerate(albedos)]
+            relative = np.array(albedos) / self._albedo
         self._relative_albedos = relative.astype(np.float32).repeat(FIELDS)[:, None, None, None]
         size = min(max(round(max(plan.domain.resolution) / BLOCKS), MIN_BLOCK), MAX_BLOCK)
         self._edge = size * plan.domain.voxel_size
@@ -76,10 +75,6 @@ class DiffuseLight:
     def _interpolate(self, radiance: Array, factor: float, medium: Array) -> None:
         """Add a multiple of what the voxels scatter of the blocks' radiance, each channel by its relative albedo."""
         _core.add_interpolated(self._relative_albedos * radiance, factor, self._blocks, medium, self._support)
-
-
-def _channels(albedos: Sequence[float]) -> list[tuple[float, slice]]:
-    return [(albedo, slice(FIELDS * number, FIELDS * (number + 1))) for number, albedo in enumerate(albedos)]
 
 
 def _of(means: Array, channels: slice) -> Array:

@@ -8,17 +8,19 @@ linear in the picture, so that a matrix says all of it.
 """
 
 from collections.abc import Iterator
+from dataclasses import replace
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
+from scipy import ndimage, sparse
 
 from smokelift.checks import Mask
-from smokelift.render.camera_rays import camera_rays
+from smokelift.render.camera_rays import BAND, camera_rays
+from smokelift.render.image import LARGEST_DEPTH
 from smokelift.render.renderer import Image, Optics, Volume
 from smokelift.scene import Camera
 from smokelift.scene.domain import LATERAL, box_around
-from smokelift.scene.projection import project_points
 
 
 def emitted(flame: Volume, density: Volume, camera: Camera, optics: Optics) -> Image:
@@ -30,10 +32,10 @@ def emitted(flame: Volume, density: Volume, camera: Camera, optics: Optics) -> I
     width, height = camera.size
     picture = np.zeros(width * height)
     if flame.any():
+        values = np.pad(flame, 1).ravel()
         pixels = np.flatnonzero(_shows(flame, camera, optics))
-        values = flame.ravel()
-        for rays, voxels, weights in _samples(density, camera, optics, pixels):
-            picture[pixels[rays]] += (weights * values[voxels]).sum(0)
+        for seen, voxels, weights in _samples(density, camera, optics, pixels, flame > 0):
+            picture[pixels[seen]] += (weights * values[voxels]).sum(0)
     return picture.reshape(height, width).astype(np.float32)
 
 
@@ -44,73 +46,57 @@ def emission_matrix(density: Volume, camera: Camera, optics: Optics, pixels: Mas
     `numpy.flatnonzero`. Density, camera and optics are as in `emitted`.
     """
     shape = np.count_nonzero(pixels), np.count_nonzero(voxels)
-    number = np.full(voxels.size, -1)
-    number[voxels.ravel()] = np.arange(shape[1])
+    numbers = np.full(voxels.shape, -1)
+    numbers[voxels] = np.arange(shape[1])
+    number = np.pad(numbers, 1, constant_values=-1).ravel()
     values, rows, columns = [np.zeros(0)], [np.zeros(0, np.intp)], [np.zeros(0, np.intp)]
-    for rays, corners, weights in _samples(density, camera, optics, np.flatnonzero(pixels)):
+    for seen, corners, weights in _samples(density, camera, optics, np.flatnonzero(pixels), voxels):
         there = (number[corners] >= 0) & (weights > 0)
         values.append(weights[there])
-        rows.append(np.broadcast_to(rays, corners.shape)[there])
+        rows.append(np.broadcast_to(seen, corners.shape)[there])
         columns.append(number[corners][there])
     entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
     return sparse.csr_array(entries, shape=shape)
 
 
 def _samples(
-    density: Volume, camera: Camera, optics: Optics, pixels: NDArray[np.intp]
+    density: Volume, camera: Camera, optics: Optics, pixels: NDArray[np.intp], burning: Mask
 ) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float64]]]:
-    """Which rays (n,) of the pixels cross a plane, the four voxels (4, n) about each place, and their weights (m).
+    """Which of the pixels (n,) have a ray that crosses a plane, the four voxels (4, n) around, and their weights (m).
 
-    Plane by plane from the camera on.
+    Plane by plane from the camera on, as far as voxels (nx, ny, nz) burn. Voxels are numbers in a volume with a border
+    of one.
     """
-    rays, shape = camera_rays(camera, optics.domain), optics.domain.resolution
-    strides = np.array([shape[1] * shape[2], shape[2], 1])
-    lines, planes = rays.lines.reshape(-1, 4)[pixels], rays.planes.reshape(-1, 4)[pixels]
-    length = rays.length.ravel()[pixels]
-    smoke, extinction = density.ravel(), optics.medium.extinction
-    clear = np.ones(len(pixels))
-    for axis in rays.axes:
-        b_axis, c_axis = LATERAL[axis]
-        for travel in (1, -1):
+    rays, padded, box = camera_rays(camera, optics.domain), np.pad(density, 1), box_around(burning, 0)
+    strides, smoke = np.array(padded.strides) // padded.itemsize, padded.ravel()
+    for part in np.array_split(np.arange(len(pixels)), len(pixels) // BAND + 1):
+        of_part = pixels[part]
+        lines, planes = rays.lines.reshape(-1, 4)[of_part], rays.planes.reshape(-1, 4)[of_part]
+        length, clear = rays.length.ravel()[of_part], np.ones(len(part))
+        for axis, travel in product(rays.axes, (1, -1)):
             along = np.flatnonzero((planes[:, 0] == axis) & (planes[:, 1] == travel))
-            for k in range(shape[axis])[::travel]:
+            b_stride, c_stride = strides[list(LATERAL[axis])]
+            corners = np.array([[0], [c_stride], [b_stride], [b_stride + c_stride]])
+            whole = range(burning.shape[axis])
+            for k in whole[: box[axis].stop] if travel > 0 else whole[box[axis].start :][::-1]:
                 here = along[(planes[along, 2] <= k) & (k <= planes[along, 3])]
                 if not here.size:
                     continue
                 b, c = (lines[here, n] + lines[here, n + 1] * k for n in (0, 2))
-                voxels, weights = [], []
-                for i, near_b in _neighbors(b, shape[b_axis]):
-                    for j, near_c in _neighbors(c, shape[c_axis]):
-                        voxels.append(k * strides[axis] + i * strides[b_axis] + j * strides[c_axis])
-                        weights.append(near_b * near_c)
-                places, weight = np.array(voxels), np.array(weights)
-                depth = extinction * length[here] * (weight * smoke[places]).sum(0)
+                i, j = np.floor(b).astype(np.intp), np.floor(c).astype(np.intp)
+                f, g = b - i, c - j
+                voxels = (k + 1) * strides[axis] + (i + 1) * b_stride + (j + 1) * c_stride + corners
+                weight = np.stack([(1 - f) * (1 - g), (1 - f) * g, f * (1 - g), f * g])
+                depth = optics.medium.extinction * length[here] * (weight * smoke[voxels]).sum(0)
                 step = clear[here] * length[here] * -np.expm1(-depth) / np.where(depth > 0, depth, 1)
                 step = np.where(depth > 0, step, clear[here] * length[here])
                 clear[here] *= np.exp(-depth)
-                yield here, places, weight * step
-
-
-def _neighbors(place: NDArray[np.float32], count: int) -> Iterator[tuple[NDArray[np.intp], NDArray[np.float32]]]:
-    """The two voxels of a row beside some places, and their linear weights: 0 outside the grid."""
-    low = np.floor(place).astype(np.intp)
-    for index, weight in ((low, 1 - (place - low)), (low + 1, place - low)):
-        yield np.clip(index, 0, count - 1), np.where((index >= 0) & (index < count), weight, 0)
+                yield part[here], voxels, weight * step
 
 
 def _shows(flame: Volume, camera: Camera, optics: Optics) -> Mask:
-    """Pixels (rows, columns) that may show a flame: those before the box of its voxels."""
-    width, height = camera.size
-    domain = optics.domain
-    ends = [
-        low + np.array((side.start - 0.5, side.stop + 0.5)) * domain.voxel_size
-        for low, side in zip(domain.min, box_around(flame > 0, 0), strict=True)
-    ]
-    corners = np.stack(np.meshgrid(*ends, indexing="ij"), -1).reshape(-1, 3)
-    seen, depth = project_points(camera, corners)
-    if (depth <= 0).any():
-        return np.ones((height, width), np.bool_)
-    low, high = seen.min(0), seen.max(0)
-    x, y = np.arange(width) + 0.5, np.arange(height) + 0.5
-    across, up = (x > low[0]) & (x < high[0]), (y > low[1]) & (y < high[1])
-    return np.asarray(up[:, None] & across)
+    """Pixels (rows, columns) that may show a flame: those that it would hide if it were opaque, and their neighbors."""
+    renderer = replace(optics, scattering="absorption").renderer(camera, np.zeros(3, np.float32))
+    opaque = np.float32(LARGEST_DEPTH / (optics.medium.extinction * optics.domain.voxel_size))
+    renderer.image(np.where(flame > 0, opaque, np.float32(0)))
+    return np.asarray(ndimage.binary_dilation(renderer.transmittance < 1))

@@ -28,8 +28,8 @@ ROUNDING = 1e-9
 """Relative difference below which two sums are equal. Processors and their libraries add in different orders."""
 
 
-def environment_lights(light: EnvironmentLight, count: int) -> tuple[DirectionalLight, ...]:
-    """Turn an environment picture into parallel lights, at most `count` of them; fewer for one with fewer bright parts.
+class EnvironmentCells:
+    """The parts of an environment's picture that are not black, read once for any number of lights.
 
     The picture is read as Blender reads it: towards a direction (x, y, z) lies the point u = 1/2 - atan2(y, x) / 2 pi
     from the left, v = 1/2 + asin(z) / pi from the bottom. ``rotation_degrees`` is the Z rotation of Blender's Mapping
@@ -37,15 +37,8 @@ def environment_lights(light: EnvironmentLight, count: int) -> tuple[Directional
     surroundings turn clockwise, seen from above. Radiance is constant over a texel. Negative values, which resampling
     filters leave in pictures, count as 0.
 
-    The lights' irradiance is in W/m^2 (perpendicular to the direction) a channel; their sum is the integral of the
-    radiance over the sphere. Every machine finds the same. An ImageError is raised if the picture cannot be read or
-    holds values that are not finite.
+    An ImageError is raised if the picture cannot be read or holds values that are not finite.
     """
-    return EnvironmentCells(light).lights(count)
-
-
-class EnvironmentCells:
-    """The parts of an environment's picture that are not black, read once for any number of lights."""
 
     def __init__(self, light: EnvironmentLight) -> None:
         self.rotation = np.radians(light.rotation_degrees)
@@ -65,7 +58,11 @@ class EnvironmentCells:
         """(cells, 3): unit vector towards the cell in the picture's own frame, that is before the rotation."""
 
     def lights(self, count: int) -> tuple[DirectionalLight, ...]:
-        """Return at most so many lights, as `environment_lights`."""
+        """Return parallel lights, at most so many; fewer for a picture with fewer bright parts.
+
+        Their irradiance is in W/m^2 (perpendicular to the direction) a channel; its sum is the integral of the radiance
+        over the sphere. Every machine finds the same.
+        """
         if count < 1:
             raise ValueError(f"An environment needs at least 1 light, not {count}.")
         return tuple(self._light(stratum) for stratum in self._strata(count))

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from smokelift.checks import numbers, radiance, require_kind
 from smokelift.extraction.given_background import background_picture
-from smokelift.render.environment import EnvironmentCells, environment_lights
+from smokelift.render.environment import EnvironmentCells
 from smokelift.render.renderer import Image, Optics, Renderer, Volume
 from smokelift.scene import (
     Camera,
@@ -226,7 +226,7 @@ def sampled_lights(scene: CompleteScene) -> tuple[FiniteLight, ...]:
 def _environment(
     light: EnvironmentLight, camera: Camera, domain: Domain, medium: Medium
 ) -> tuple[DirectionalLight, ...]:
-    return environment_lights(light, light.directions or environment_count(light, camera, domain, medium))
+    return EnvironmentCells(light).lights(light.directions or environment_count(light, camera, domain, medium))
 
 
 def environment_count(light: EnvironmentLight, camera: Camera, domain: Domain, medium: Medium) -> int:

@@ -31,7 +31,8 @@ def project_with_given_faces(
     Where no field without divergence has them, the nearest are taken. The iteration ends at a `TOLERANCE` relative to
     the first gradient, or after `limit` rounds.
     """
-    weights = [_half_on_sides(len(mask.shape), mask.shape[axis], axis) for axis, mask in enumerate(given)]
+    # a face on a side of the box belongs to half a voxel
+    weights = np.ix_(*(np.r_[0.5, np.ones(count - 1), 0.5].astype(np.float32) for count in field.shape))
 
     def projected(faces: list[Array]) -> list[Array]:
         return list(without_divergence(field.with_faces(faces))[0].faces)
@@ -76,10 +77,3 @@ def _beside(voxels: Mask) -> Iterator[tuple[Mask, Mask]]:
     for axis in range(3):
         below, above = (np.pad(voxels, [end if d == axis else (0, 0) for d in range(3)]) for end in ((1, 0), (0, 1)))
         yield below, above
-
-
-def _half_on_sides(dimensions: int, count: int, axis: int) -> Array:
-    """Weights of the faces in the inner product of the projection: half on the sides of the box."""
-    along = np.ones(count, np.float32)
-    along[[0, -1]] = 0.5
-    return along.reshape([-1 if d == axis else 1 for d in range(dimensions)])

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from smokelift.checks import Array, numbers, shown
 from smokelift.scene import SIDES, Side
-from smokelift.scene.checks import LARGEST, SMALLEST
+from smokelift.scene.checks import LARGEST, SMALLEST, set_fields
 from smokelift.scene.domain import checked_sides
 
 Faces = tuple[Array, Array, Array]
@@ -59,8 +59,7 @@ class StaggeredGrid:
                 f"faces of shapes {shapes} do not belong to one box: "
                 "expected (nx+1, ny, nz), (nx, ny+1, nz) and (nx, ny, nz+1)."
             )
-        object.__setattr__(self, "faces", (x, y, z))
-        object.__setattr__(self, "closed", checked_sides(self.closed))
+        set_fields(self, faces=(x, y, z), closed=checked_sides(self.closed))
 
     @classmethod
     def zero(cls, shape: tuple[int, ...], voxel_size: float, closed: Iterable[Side] = ()) -> Self:
@@ -177,12 +176,7 @@ def part_of(velocity: Velocity, box: VoxelBox) -> Velocity:
     ends = [(side.start == 0, side.stop == count) for side, count in zip(box, velocity.shape, strict=True)]
     outer = [end for pair in ends for end in pair]
     closed = tuple(side for side, wall, shared in zip(SIDES, velocity.walls, outer, strict=True) if wall and shared)
-    return Velocity(
-        faces_in(velocity.faces, box),
-        velocity.voxel_size,
-        closed,
-        figures=velocity.figures,
-    )
+    return Velocity(faces_in(velocity.faces, box), velocity.voxel_size, closed, figures=velocity.figures)
 
 
 def at_centres(faces: Faces) -> Faces:

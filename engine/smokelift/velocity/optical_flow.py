@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage, sparse
 from scipy.sparse.linalg import cg
 
@@ -73,13 +73,13 @@ def correct_by_optical_flow(velocity: Velocity, pictures: PicturePair, density: 
         correction = image.lifted(_correction(image, motion, pictures)) / np.float32(scale)
         faces = zip(velocity.faces, on_faces(correction), strict=True)
         velocity = velocity.with_faces(component + added for component, added in faces)
-    return averaged_along(velocity, (float(ray[0]), float(ray[1]), float(ray[2])))
+    return averaged_along(velocity, ray)
 
 
-def averaged_along(velocity: Velocity, line: tuple[float, float, float]) -> Velocity:
+def averaged_along(velocity: Velocity, line: ArrayLike) -> Velocity:
     """A velocity averaged along a line of sight, without divergence; what is known of it stays as it is.
 
-    The line has any length and either direction.
+    The line (3,) has any length and either direction.
     """
     kernel = _line(np.array(line) / np.linalg.norm(line), SPREAD * min(velocity.shape))
     # one kernel for all components keeps the divergence zero, but not at the sides of the box

@@ -73,6 +73,8 @@ def test_smoke_dissolves_softly_before_a_side_that_cannot_move():
         assert (profile[:9] > 0.9).all()
         assert profile[-1] < 0.1
         assert np.abs(np.diff(profile)).max() < 0.5
+        mirrored = dissolve(SmokeState(state.density[::-1], along_x(-speed)), ("x-",), DT)
+        np.testing.assert_allclose(mirrored.density[::-1], dissolve(state, ("x+",), DT).density, atol=1e-6)
     still = at_rest(blob((0.8, 0.0, 1.0)))
     assert dissolve(still, ("x+",), DT).density == pytest.approx(still.density)
 

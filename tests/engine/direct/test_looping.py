@@ -5,7 +5,7 @@ import pytest
 
 from smokelift import Sequence, Velocity
 from smokelift.direct.looping import loop_sequence, mix_by_edges, seam
-from smokelift.direct.state import SmokeState
+from smokelift.direct.state import SmokeState, read_state
 from smokelift.scene import SIDES, Domain
 from tests.engine.direct import rising
 from tests.engine.direct.rising import DOMAIN, DT, blob
@@ -54,6 +54,10 @@ def test_a_loop_ends_where_it_begins(source, tmp_path):
     assert loop.frames == tuple(range(1, 7))
     np.testing.assert_array_equal(loop.density(4), source.density(5))
     np.testing.assert_array_equal(loop.density(6), source.density(7))
+    # the motion from the end to the start takes as long as the overlap and the step into it
+    first = seam(read_state(source, 8), read_state(source, 2), 1 / 4, 4 * DT)
+    for found, expected in zip(loop.velocity(1).faces, first.velocity.faces, strict=True):
+        np.testing.assert_allclose(found, expected, atol=1e-6)
 
     def step(a, b):
         return float(np.linalg.norm(a - b))

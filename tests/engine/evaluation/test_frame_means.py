@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from smokelift.evaluation.frame_means import VolumeMeans, eight_bit_values, finite_mean, means, picture_figures
+from smokelift.evaluation.frame_means import eight_bit_values, finite_mean, means, picture_figures, volume_means
 from smokelift.evaluation.truth import Truth, resampled
 from smokelift.transport import Velocity
 
@@ -42,10 +42,8 @@ def truth() -> Truth:
 
 def scored(truth: Truth, change=lambda _, *moment: moment, frames: Iterable[int] = range(4)) -> dict[str, float]:
     """Figures of the truth's own frames, whose density and velocity are changed."""
-    score = VolumeMeans(truth)
-    for frame in frames:
-        score.add(frame, *change(frame, truth.density(frame), truth.velocity(max(frame - 1, 0)).centres()))
-    return score.figures()
+    moments = ((frame, truth.density(frame), truth.velocity(max(frame - 1, 0)).centres()) for frame in frames)
+    return volume_means(truth, ((frame, *change(frame, *moment)) for frame, *moment in moments))
 
 
 def picture(shift: int = 0, size: tuple[int, int] = (96, 64)) -> np.ndarray:
@@ -73,7 +71,7 @@ def test_the_truth_itself_is_perfect(truth) -> None:
 
 
 def test_each_mistake_shows_where_it_belongs(truth) -> None:
-    half = scored(truth, lambda _, density, velocity: (0.5 * density,))
+    half = scored(truth, lambda _, density, velocity: (0.5 * density, None))
     deep = scored(truth, lambda _, density, velocity: (np.roll(density, 1, 1), velocity))
     slow = scored(truth, lambda frame, density, velocity: (density, (0.5, 0, 0.5, 1)[frame] * velocity))
     assert half["mass_ratio"] == half["height_mass_error"] == pytest.approx(0.5)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from smokelift.footage.images import ImageError
-from smokelift.render.environment import environment_lights
+from smokelift.render.environment import EnvironmentCells
 from smokelift.scene import EnvironmentLight
 from tests.engine.render.environments import sky, soft_lamps, texels
 
@@ -22,7 +22,7 @@ def towards(lights) -> np.ndarray:
 )
 def test_no_light_is_lost_or_made(light_of, size, count) -> None:
     radiance = np.random.default_rng(0).random((*size, 3)) ** 4
-    lights = environment_lights(light_of(radiance, strength=2.5), count)
+    lights = EnvironmentCells(light_of(radiance, strength=2.5)).lights(count)
     _, solid_angle = texels(*size)
     wanted = 2.5 * (radiance * solid_angle[..., None]).sum((0, 1))
     assert len(lights) == count
@@ -37,7 +37,7 @@ def test_a_lamp_shines_from_its_texel(light_of, row, column) -> None:
     """
     radiance = np.zeros((32, 64, 3))
     radiance[row, column] = 4.0, 2.0, 1.0
-    (lamp,) = environment_lights(light_of(radiance), 1)
+    (lamp,) = EnvironmentCells(light_of(radiance)).lights(1)
     directions, solid_angle = texels(32, 64)
     np.testing.assert_allclose(
         -np.array(lamp.direction), directions[row, column], atol=0.02 if row in (0, 31) else 1e-3
@@ -53,7 +53,7 @@ def test_rotation_turns_the_surroundings_as_blenders_mapping(light_of, degrees, 
     """The expected directions are what Cycles 4.5 shows of this picture behind a Mapping node, the last by symmetry."""
     radiance = np.zeros((64, 128, 3))
     radiance[20:30, 60:68] = 1.0
-    (lamp,) = environment_lights(light_of(radiance, rotation_degrees=degrees), 1)
+    (lamp,) = EnvironmentCells(light_of(radiance, rotation_degrees=degrees)).lights(1)
     np.testing.assert_allclose(-np.array(lamp.direction), expected, atol=2e-3)
 
 
@@ -64,7 +64,7 @@ def test_a_sun_stays_one_light(light_of) -> None:
     sun = np.array([0.6, -0.5, 0.62]) / np.linalg.norm([0.6, -0.5, 0.62])
     disc = directions @ sun > np.cos(np.radians(0.25))
     radiance[disc] = 1e5
-    lights = environment_lights(light_of(radiance), 32)
+    lights = EnvironmentCells(light_of(radiance)).lights(32)
     near = towards(lights) @ sun > np.cos(np.radians(0.5))
     assert 1 <= near.sum() <= 2
     of_sun, of_sky = (
@@ -89,7 +89,7 @@ def test_smooth_sums_over_the_sphere_converge(light_of) -> None:
     exact = np.exp(sharpness * (axes @ directions.reshape(-1, 3).T)) @ flux
     light, errors = light_of(radiance), []
     for count in (16, 64):
-        lights = environment_lights(light, count)
+        lights = EnvironmentCells(light).lights(count)
         found = np.exp(sharpness * (axes @ towards(lights).T)) @ irradiances(lights)
         errors.append(np.sqrt(np.square(found / exact - 1).mean((1, 2))))
     assert (errors[0] < [0.03, 0.09]).all()
@@ -102,18 +102,20 @@ def test_values_that_are_not_finite_are_refused_and_negative_ones_black(light_of
 
     radiance = np.random.default_rng(3).random((8, 16, 3)).astype(np.float32)
     radiance[3, 4, 1] = 0
-    clean = environment_lights(light_of(radiance), 8)
+    clean = EnvironmentCells(light_of(radiance)).lights(8)
     radiance[3, 4, 1] = value
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     OpenEXR.File(header, {"RGB": radiance}).write(str(tmp_path / "raw.exr"))
     raw = EnvironmentLight(tmp_path / "raw.exr")
     if np.isnan(value):
         with pytest.raises(ImageError):
-            environment_lights(raw, 8)
+            EnvironmentCells(raw).lights(8)
     else:
-        assert environment_lights(raw, 8) == clean
+        assert EnvironmentCells(raw).lights(8) == clean
 
 
 def test_a_picture_without_light_becomes_none(light_of) -> None:
     black = np.zeros((64, 128, 3))
-    assert environment_lights(light_of(black), 16) == environment_lights(light_of(sky(), strength=0.0), 16) == ()
+    assert (
+        EnvironmentCells(light_of(black)).lights(16) == EnvironmentCells(light_of(sky(), strength=0.0)).lights(16) == ()
+    )

@@ -12,7 +12,7 @@ import pytest
 from smokelift import render, render_gradient
 from smokelift.render import Optics, scene_optics, scene_renderer
 from smokelift.render import image as image_module
-from smokelift.render.environment import environment_lights
+from smokelift.render.environment import EnvironmentCells
 from smokelift.render.image import environment_count, sampled_lights
 from smokelift.scene import Camera, DirectionalLight, Domain, Medium, PointLight, Scene, completed
 from tests.engine.render.environments import sky
@@ -118,7 +118,7 @@ def test_the_count_is_enough_and_few_where_few_are(light_of, plume) -> None:
     count = environment_count(light, camera, domain, medium)
     assert 8 <= count < 256
     few, many = (
-        Optics(domain, medium, environment_lights(light, number)).renderer(camera, black).image(plume.densities[0])
+        Optics(domain, medium, EnvironmentCells(light).lights(number)).renderer(camera, black).image(plume.densities[0])
         for number in (count, 256)
     )
     assert np.linalg.norm(few - many) < 0.01 * np.linalg.norm(many)
