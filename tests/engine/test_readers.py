@@ -2,7 +2,6 @@
 
 import json
 import tomllib
-import zipfile
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -21,7 +20,7 @@ from smokelift.evaluation.truth import Truth, TruthError
 from smokelift.footage.frame_source import ClipError
 from smokelift.footage.images import ImageError, read_image
 from smokelift.output.archive import VELOCITY, read_arrays, write_arrays
-from smokelift.output.files import INDEX, checksum
+from smokelift.output.files import INDEX
 from smokelift.output.images import write_image
 from smokelift.output.index import Index, SequenceError
 from smokelift.output.resume import ResumeState
@@ -68,14 +67,6 @@ def _write_index(path: Path) -> None:
         scene_to_dict(_SCENE, path.parent), {"density": {"scattering": "single"}}, frames={"1": {"psnr": 40.0}}
     )
     index.write(path.parent)
-
-
-def _read_member(path: Path) -> object:
-    """Read it as an archive holds it, whose own checksum would hide what is damaged."""
-    archive = path.with_suffix(".npz")
-    with zipfile.ZipFile(archive, "w") as file:
-        file.write(path, path.name)
-    return read_arrays(archive, {"density": SHAPE})
 
 
 def _write_truth(path: Path) -> None:
@@ -126,7 +117,6 @@ READERS = {
         lambda path: read_arrays(path, {name: array.shape for name, array in TWIN.items()}),
         OSError,
     ),
-    "array": Reader("density.npy", lambda path: np.save(path, VOLUME), _read_member, OSError),
     "truth": Reader("truth.npz", _write_truth, Truth.load, TruthError),
     **{kind: Reader(name, write, read_image, ImageError) for kind, (name, write) in PICTURES.items()},
     "environment": Reader(
@@ -265,16 +255,3 @@ def test_any_name_of_a_clip_ends_well(tmp_path, pattern, names) -> None:
     with pytest.raises(ClipError) as caught:
         Clip.open(tmp_path / f"{pattern}.png")
     assert "\n" not in str(caught.value)
-
-
-@TRIES
-@given(content=st.binary(max_size=200), place=st.integers(0, 199), byte=st.integers(1, 255))
-def test_a_checksum_sees_every_byte(tmp_path, content, place, byte) -> None:
-    file = tmp_path / "file"
-    file.write_bytes(content)
-    before = checksum([file])
-    assert checksum([file]) == before
-    changed = bytearray(content or b"\0")
-    changed[place % len(changed)] ^= byte
-    file.write_bytes(changed)
-    assert checksum([file]) != before
