@@ -7,6 +7,7 @@ import ast
 import html
 import re
 import sys
+from functools import cache
 from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
@@ -60,6 +61,7 @@ class Constant(NamedTuple):
     set_by: str
 
 
+@cache
 def constants(path: Path) -> list[Constant]:
     """Return the constants of a module in whose values there are numbers, in the order of its lines."""
     text = path.read_text(encoding="utf-8")

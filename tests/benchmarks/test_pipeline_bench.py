@@ -33,7 +33,7 @@ def test_a_run_is_timed_in_a_process_of_its_own(tmp_path, monkeypatch):
     monkeypatch.setattr(clip, "PIXELS", (48, 72))
     monkeypatch.setattr(clip, "SHAPE", SHAPE)
     with_grid(write_clip(tmp_path, UNTIMED + 1), SHAPE).save(tmp_path / "scene.toml")
-    found = run_apart(tmp_path / "scene.toml", Settings.preset(), SHAPE, 1, "wall")
+    found = run_apart(tmp_path / "scene.toml", Settings.preset("draft"), SHAPE, 1, "wall")
     assert found.failure == ""
     assert 0 < found.seconds_density + found.seconds_velocity <= found.seconds
     assert found.solves > 0 and found.psnr > 30

@@ -1,13 +1,13 @@
 """One tiny plume for the tests of everything that needs footage: known volumes, and the pictures of them."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from smokelift import Background, Camera, ClipSource, DirectionalLight, Domain, Medium, Scene, Settings, _core
+from smokelift import Background, Camera, ClipSource, DirectionalLight, Domain, Medium, Scene, Settings
 from smokelift.output.images import write_image
 from smokelift.render import device, render
 from smokelift.scene import CompleteScene, View, completed, look_at_matrix, orbit
@@ -118,10 +118,3 @@ def two_views(plume, tmp_path_factory) -> Scene:
 def draft() -> Settings:
     """Settings that are quick."""
     return Settings.preset("draft")
-
-
-@pytest.fixture
-def set_threads(threads_of_a_worker) -> Iterator[Callable[[int], None]]:
-    """Compute with a number of threads for the rest of a test."""
-    yield _core.set_threads
-    _core.set_threads(threads_of_a_worker)

@@ -2,7 +2,6 @@
 
 import json
 import tomllib
-import zipfile
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -21,7 +20,7 @@ from smokelift.evaluation.truth import Truth, TruthError
 from smokelift.footage.frame_source import ClipError
 from smokelift.footage.images import ImageError, read_image
 from smokelift.output.archive import VELOCITY, read_arrays, write_arrays
-from smokelift.output.files import INDEX, checksum
+from smokelift.output.files import INDEX
 from smokelift.output.images import write_image
 from smokelift.output.index import Index, SequenceError
 from smokelift.output.resume import ResumeState
@@ -68,14 +67,6 @@ def _write_index(path: Path) -> None:
         scene_to_dict(_SCENE, path.parent), {"density": {"scattering": "single"}}, frames={"1": {"psnr": 40.0}}
     )
     index.write(path.parent)
-
-
-def _read_member(path: Path) -> object:
-    """Read it as an archive holds it, whose own checksum would hide what is damaged."""
-    archive = path.with_suffix(".npz")
-    with zipfile.ZipFile(archive, "w") as file:
-        file.write(path, path.name)
-    return read_arrays(archive, {"density": SHAPE})
 
 
 def _write_truth(path: Path) -> None:
@@ -126,7 +117,6 @@ READERS = {
         lambda path: read_arrays(path, {name: array.shape for name, array in TWIN.items()}),
         OSError,
     ),
-    "array": Reader("density.npy", lambda path: np.save(path, VOLUME), _read_member, OSError),
     "truth": Reader("truth.npz", _write_truth, Truth.load, TruthError),
     **{kind: Reader(name, write, read_image, ImageError) for kind, (name, write) in PICTURES.items()},
     "environment": Reader(
@@ -142,9 +132,13 @@ TRIES = settings(
 NUMBERS = st.one_of(
     st.integers(), st.floats(), st.sampled_from([0, -1, 2**31, 10**400, 1e-45, 1e38, 1e300, -0.0, 10**9, 1e-9])
 )
+TEXT = st.text(st.characters(exclude_categories=["Cs"]), max_size=5)
+"""Of all that a file can hold, which Hypothesis finds in seconds if it is left to itself."""
+
+PLACES = st.sampled_from(["/dev/zero", "http://a/b.mp4", "..", "#", "\0"])
 ANYTHING = st.recursive(
-    NUMBERS | st.booleans() | st.text(max_size=5) | st.sampled_from(["/dev/zero", "http://a/b.mp4", "..", "#", "\0"]),
-    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=4), inner, max_size=3),
+    NUMBERS | st.booleans() | TEXT | PLACES,
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(TEXT, inner, max_size=3),
     max_leaves=8,
 )
 
@@ -188,7 +182,7 @@ def changed_values(draw: st.DrawFn, tables: dict[str, Any]) -> Any:
                 break
             holder = holder[key]
         if isinstance(holder, dict) and draw(st.integers(0, 4)) == 0:
-            holder[draw(st.text(max_size=4))] = draw(ANYTHING)
+            holder[draw(TEXT)] = draw(ANYTHING)
     return data
 
 
@@ -209,7 +203,7 @@ def test_a_sound_file_is_read(reader, sound) -> None:
     assert reader.read(sound) is not None
 
 
-@settings(TRIES, max_examples=120)
+@TRIES
 @given(data=st.data())
 def test_other_bytes_end_well(reader, sound, tmp_path, data) -> None:
     """Changed in places, or any others."""
@@ -218,7 +212,7 @@ def test_other_bytes_end_well(reader, sound, tmp_path, data) -> None:
     ends_well(reader, path)
 
 
-@settings(TRIES, max_examples=90)
+@TRIES
 @given(data=st.data())
 @pytest.mark.parametrize(
     ("reader", "loads", "dumps"),
@@ -261,16 +255,3 @@ def test_any_name_of_a_clip_ends_well(tmp_path, pattern, names) -> None:
     with pytest.raises(ClipError) as caught:
         Clip.open(tmp_path / f"{pattern}.png")
     assert "\n" not in str(caught.value)
-
-
-@TRIES
-@given(content=st.binary(max_size=200), place=st.integers(0, 199), byte=st.integers(1, 255))
-def test_a_checksum_sees_every_byte(tmp_path, content, place, byte) -> None:
-    file = tmp_path / "file"
-    file.write_bytes(content)
-    before = checksum([file])
-    assert checksum([file]) == before
-    changed = bytearray(content or b"\0")
-    changed[place % len(changed)] ^= byte
-    file.write_bytes(changed)
-    assert checksum([file]) != before

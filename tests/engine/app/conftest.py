@@ -5,7 +5,15 @@ from pathlib import Path
 import pytest
 from command_line import QUICK
 
+from smokelift import _core
+from smokelift.app import cli
 from smokelift.app.cli import main
+
+
+@pytest.fixture(autouse=True)
+def one_thread_of_a_command(monkeypatch) -> None:
+    """A command that is given no number computes on one thread, as all tests do."""
+    monkeypatch.setattr(cli, "set_threads", lambda count: _core.set_threads(count or 1))
 
 
 @pytest.fixture(scope="session")

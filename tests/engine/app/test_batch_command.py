@@ -1,16 +1,24 @@
 """``smokelift batch`` on real clips."""
 
+import functools
 import json
+import sys
 
 import pytest
 
 from smokelift.app.cli import main
+from smokelift.app.commands import batch
+from smokelift.batch import work
 from smokelift.output.sequence import Sequence
+
+REFUSAL = json.dumps({"event": "error", "text": "missing.mp4: no such file", "status": 2, "later": False})
+REFUSING = (sys.executable, "-S", "-c", f"print({REFUSAL!r}); raise SystemExit(2)")
+"""Stands in for an engine whose clip is missing."""
 
 
 @pytest.fixture
 def shots(shot, tmp_path):
-    """A list of a short shot and of one whose clip is missing."""
+    """A list of a short shot."""
     path = tmp_path / "shots.toml"
     path.write_text(
         f"""
@@ -21,22 +29,25 @@ npz = true
 input = "{shot.as_posix()}"
 name = "plume"
 frames = [0, 1]
-[[shots]]
-input = "missing.mp4"
 """
     )
     return path
 
 
-def test_a_batch_runs_what_it_can_and_goes_on_later(shots, capsys) -> None:
-    folder = shots.parent / "results"
+def test_a_batch_runs_what_it_can_and_goes_on_later(shots, capsys, monkeypatch) -> None:
+    folder, listed = shots.parent / "results", shots.read_text()
+    assert main(["batch", str(shots)]) == 0
+    assert Sequence.open(folder / "plume").complete
+    made = (folder / "plume" / "sequence.json").stat().st_mtime_ns
+    for name in ("inspect_shot", "finish_shot"):
+        monkeypatch.setattr(batch, name, functools.partial(getattr(work, name), engine=REFUSING))
+    shots.write_text(f'{listed}[[shots]]\ninput = "missing.mp4"\n')
+    capsys.readouterr()
     assert main(["batch", str(shots), "--progress", "json"]) == 2
     events = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     assert events[-1]["text"].startswith("1 of 2 shots did not come to the end (missing)")
-    assert Sequence.open(folder / "plume").complete
     assert "missing.mp4: no such file" in (folder / "report.html").read_text()
-    made = (folder / "plume" / "sequence.json").stat().st_mtime_ns
-    shots.write_text(shots.read_text().split('[[shots]]\ninput = "missing')[0])
+    shots.write_text(listed)
     assert main(["batch", str(shots)]) == 0
     assert (folder / "plume" / "sequence.json").stat().st_mtime_ns == made
     assert json.loads((folder / "plume.json").read_text())["runs"] == 1

@@ -1,6 +1,7 @@
 """Where a command's words go: closed pipes, full disks, poor encodings, hostile names, and signals at any time."""
 
 import errno
+import io
 import json
 import os
 import subprocess
@@ -9,22 +10,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from command_line import ENVIRONMENT, MODULE, command, refused
+from command_line import ENVIRONMENT, command, refused
 
 from smokelift.app.progress import printable_lines
-from smokelift.batch.work import ENGINE
 from smokelift.output.index import SequenceError
 from smokelift.render import device
 
 MISSING = ("inspect", "missing.toml")
-UNWRITTEN = "Standard output cannot be written"
-
-
-def ended(*words: str | bytes, **options: Any) -> tuple[int, list[str]]:
-    """Status and lines of standard error of a command in a process of its own."""
-    options = {"env": ENVIRONMENT, "stdout": subprocess.PIPE, **options}
-    done = subprocess.run([*MODULE, *words], stderr=subprocess.PIPE, timeout=60, check=False, **options)
-    return done.returncode, done.stderr.decode("ascii").splitlines()
 
 
 def ended_python(code: str) -> tuple[int, bytes]:
@@ -33,23 +25,29 @@ def ended_python(code: str) -> tuple[int, bytes]:
     return done.returncode, done.stderr
 
 
-def test_a_closed_pipe_cancels_and_a_full_disk_is_bad_output() -> None:
+def test_a_closed_pipe_cancels_and_a_full_disk_is_bad_output(capsys, monkeypatch) -> None:
+    """In one sentence, also when the stream is closed with what it still holds."""
     read, write = os.pipe()
     os.close(read)
-    assert ended(*MISSING, "--progress", "json", stdout=write) == (130, [f"{UNWRITTEN}: Broken pipe."])
-    os.close(write)
+    streams = [(write, 130, "Broken pipe")]
     if Path("/dev/full").exists():
-        with Path("/dev/full").open("wb") as full:
-            status, lines = ended(*MISSING, "--progress", "json", stdout=full)
-        assert (status, lines) == (2, [f"{UNWRITTEN}: {os.strerror(errno.ENOSPC)}."])
+        streams.append((os.open("/dev/full", os.O_WRONLY), 2, os.strerror(errno.ENOSPC)))
+    for descriptor, status, reason in streams:
+        with os.fdopen(descriptor, "w") as stream, monkeypatch.context() as patched:
+            patched.setattr(sys, "stdout", stream)
+            assert command(*MISSING, "--progress", "json") == status
+        assert capsys.readouterr().err == f"Standard output cannot be written: {reason}.\n"
 
 
-def test_control_characters_of_a_path_are_spelt_out(capsys) -> None:
+def test_control_characters_of_a_path_are_spelt_out(capsys, monkeypatch) -> None:
+    """And letters that the terminal's encoding lacks."""
     for path, spelt in (("a\nb.toml", r"a\nb.toml"), ("\x1b]0;owned\x07\x9b31m.toml", r"\x1b]0;owned\x07\x9b31m.toml")):
         assert refused(capsys, "inspect", path) == f"{spelt}: cannot be read: No such file or directory"
     assert printable_lines("two\nlines, räuchern, 烟") == "two\nlines, räuchern, 烟"
-    status, lines = ended("inspect", "räuchern.toml", env={**ENVIRONMENT, "PYTHONIOENCODING": "ascii"})
-    assert (status, lines) == (2, [r"r\xe4uchern.toml: cannot be read: No such file or directory"])
+    written = io.BytesIO()
+    monkeypatch.setattr(sys, "stderr", io.TextIOWrapper(written, "ascii", write_through=True))
+    assert command("inspect", "räuchern.toml") == 2
+    assert written.getvalue() == b"r\\xe4uchern.toml: cannot be read: No such file or directory\n"
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no signals to send")
@@ -69,16 +67,6 @@ sys.meta_path.insert(0, Finder())
 sys.exit(smokelift_command.main())
 """
     assert ended_python(code) == (130, b"Cancelled.\n")
-
-
-def test_the_engine_of_a_batch_loads_while_its_input_is_held_and_ends_with_it() -> None:
-    pipes: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE}
-    with subprocess.Popen([*ENGINE, "doctor"], env=ENVIRONMENT, **pipes) as process:
-        assert process.wait(timeout=60) == 0
-    words = [*ENGINE, "reconstruct", "/dev/null", "--out", "never"]
-    pipes["stdin"] = subprocess.DEVNULL
-    done = subprocess.run(words, env=ENVIRONMENT, check=False, timeout=60, **pipes)
-    assert done.returncode == 130 and done.stderr.endswith(b"Cancelled.\n")
 
 
 def test_the_end_of_its_input_cancels() -> None:

@@ -10,7 +10,10 @@ from command_line import command
 from tests.engine.output.small_sequence import has_vdb
 
 PAGE = Path(__file__).resolve().parents[3] / "docs" / "tour.md"
-COMMANDS = re.findall(r"^ {4}smokelift (.*)$", PAGE.read_text(encoding="utf-8"), re.MULTILINE)
+LINES = re.findall(r"^ {4}smokelift (.*)$", PAGE.read_text(encoding="utf-8"), re.MULTILINE)
+COMMANDS = {line.split()[0]: line for line in reversed(LINES)}.values()
+"""The first of each; the options of the others are parsed in `test_manual`."""
+
 WRITE_FILES = ("reconstruct", "continue", "retime", "loop")
 
 

@@ -211,7 +211,7 @@ def test_leaving_early_ends_the_engines(make_shot, fake, engines, until, monkeyp
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no signals to send")
-@pytest.mark.parametrize("number", ["SIGINT", "SIGTERM", "SIGKILL"])
+@pytest.mark.parametrize("number", ["SIGTERM", "SIGKILL"])
 def test_a_batch_that_is_interrupted_leaves_no_engine(make_shot, engines, until, tmp_path, number) -> None:
     """Only the batch gets the signal. An engine that does not end by itself is killed, unless the batch is."""
     killed = number == "SIGKILL"

@@ -11,8 +11,6 @@ import smokelift
 from smokelift import Camera, Clip, ClipSource, DirectionalLight, Domain, Scene, Sequence, Settings, Velocity
 from smokelift.checks import counted, numbers, radiance, shown
 from smokelift.density import Observation
-from smokelift.footage.frame_source import ClipError
-from smokelift.footage.images import ImageError
 from smokelift.output.images import write_image
 from smokelift.output.index import SequenceError
 from smokelift.pipeline import compose
@@ -110,26 +108,12 @@ OTHERS: list[tuple[str, Callable[[Any], Any], dict[str, Any]]] = [
 OWN_KINDS = (SceneError, SequenceError)
 """Errors of scenes and settings, and of sequences; of all else it is ValueError itself."""
 
-FILES: dict[type[ValueError], Callable[[Path], object]] = {
-    SceneError: lambda folder: Scene.load(folder / "none.toml"),
-    ClipError: lambda folder: Clip.open(folder / "none.mp4"),
-    ImageError: lambda folder: Clip.open(folder / "frame_0.png", mask=folder / "none.png"),
-    SequenceError: lambda folder: Sequence.open(folder),
-}
-
 
 @pytest.mark.parametrize(("words", "function", "named"), OTHERS)
 def test_what_is_no_such_thing_is_refused(words, function, named) -> None:
     kind = refused(words, function, **named)
     owned = (Scene, smokelift.Medium, Settings, Settings.preset, Sequence.open)
     assert kind in OWN_KINDS if function in owned or "closed" in named else kind is ValueError
-
-
-@pytest.mark.parametrize(("kind", "call"), FILES.items())
-def test_files_have_the_kind_of_what_they_hold(clip, tmp_path, kind, call) -> None:
-    with pytest.raises(kind) as caught:
-        call(tmp_path)
-    assert type(caught.value) is kind
 
 
 @pytest.mark.parametrize("opens", [Clip.open, Scene.load, SCENE.save, Sequence.open, ClipSource])

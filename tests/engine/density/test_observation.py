@@ -103,7 +103,7 @@ def test_smoke_before_a_wall_is_extracted_and_fitted(plume, small, wall, element
 
 
 def filmed(small: Scene, contrast: float, opacity: float, codes: float) -> list[Picture]:
-    """Where six pictures of a veil before a wall of the same mean color show smoke, in noise and a codec's shifts.
+    """Where three pictures of a veil before a wall of the same mean color show smoke, in noise and a codec's shifts.
 
     The wall's detail has a contrast, and its blocks of 8 to 64 pixels shift by so many codes.
     """
@@ -114,7 +114,7 @@ def filmed(small: Scene, contrast: float, opacity: float, codes: float) -> list[
     plate = eight_bit_plate(wall, camera.size)
     veil = opacity * VEIL[..., None]
     behind, shown = 255 * linear_to_srgb(wall * (1 - veil) + veil * wall.mean((0, 1))), []
-    for seed in range(6):
+    for seed in range(3):
         random = np.random.default_rng(seed)
         noisy = behind + random.normal(0, 0.5, behind.shape)
         for side in (8, 16, 32, 64):

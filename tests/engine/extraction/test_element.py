@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from smokelift import _core
 from smokelift.extraction.element import MODEL_ERROR, Element, extract_element
 from smokelift.extraction.plate import Plate, noise_at
 from smokelift.footage.images import Picture, area_average, blurred, linear_to_srgb, srgb_to_linear
@@ -240,10 +241,10 @@ def test_a_flipped_picture_has_a_flipped_element(before_wall, flip) -> None:
     assert rms(flipped.deviation / flip(before_wall.deviation) - 1) < 0.02
 
 
-def test_the_result_is_that_of_any_number_of_threads(set_threads) -> None:
+def test_the_result_is_that_of_any_number_of_threads() -> None:
     found = []
     for count in (1, 2, 1):
-        set_threads(count)
+        _core.set_threads(count)
         found.append(extracted(PICTURE, plate_of(WALL)))
     for other in found[1:]:
         for one, same in zip(fields_of(found[0]), fields_of(other), strict=True):

@@ -85,6 +85,12 @@ def along_the_path(tracked, draft, tmp_path_factory) -> tuple[list[Frame], Path]
     return frames_written(tracked, draft, out), out
 
 
+@pytest.fixture(scope="module")
+def coarse(plume) -> Scene:
+    """The plume on a grid half as fine, for what asks nothing of its figures."""
+    return replace(plume.scene, domain=replace(plume.scene.domain, resolution=(12, 12, 16)))
+
+
 def test_density_is_carried_from_the_third_frame_on(run, plume, draft) -> None:
     """It is most of the start, since detail is made up once, and a frame says how much it took over."""
     alone = frames_of(plume.scene, replace(draft, transport=0.0), count=3)
@@ -110,7 +116,7 @@ def test_picture_mass_and_motion_are_about_right(run, plume) -> None:
             assert np.abs(mean[:2]).max() < 0.3 * speed
 
 
-def test_walls_and_inlets_of_the_scene_are_kept(plume, draft, tmp_path) -> None:
+def test_walls_and_inlets_of_the_scene_are_kept(coarse, draft, tmp_path) -> None:
     """And a run that is complete is not computed again."""
     inflows, estimated = [], []
 
@@ -120,7 +126,7 @@ def test_walls_and_inlets_of_the_scene_are_kept(plume, draft, tmp_path) -> None:
             estimated.append(super().estimate(pair, *given))
             return estimated[-1]
 
-    scene = replace(plume.scene.with_frames(0, 2), closed=("z-",), inlets=(Inlet((0, 0, 0.3), 0.2),))
+    scene = replace(coarse.with_frames(0, 2), closed=("z-",), inlets=(Inlet((0, 0, 0.3), 0.2),))
     frames: list[Frame] = []
     with Clip.open(scene.clip) as clip:
         shot = prepare_shot(clip, scene, draft)
@@ -236,7 +242,7 @@ def test_further_views_put_the_smoke_in_its_place(plume, two_views, draft, tmp_p
         assert min(sequence.figures(number)["psnr"], sequence.figures(number)["psnr_view_1"]) > 35
 
 
-def test_the_papers_loop_takes_all(plume) -> None:
+def test_the_papers_loop_takes_all(coarse) -> None:
     paper = Settings.preset("draft", "paper")
     starts, density_fit = [], FixedRateDescent(iterations=1)
 
@@ -246,7 +252,7 @@ def test_the_papers_loop_takes_all(plume) -> None:
             return density_fit.fit(views, depth, initial)
 
     method = replace(compose(paper), density_fit=Watched())
-    frames = frames_of(plume.scene, paper, method, count=3)
+    frames = frames_of(coarse, paper, method, count=3)
     assert [start is None for start in starts] == [True, True, False]
     assert all(frame.figures["transport"] == {} for frame in frames)
 
@@ -317,12 +323,12 @@ def test_frames_without_smoke_are_empty(plume, draft, tmp_path, detail) -> None:
         assert (frame.figures["hull_share"] > 0) == bool(clip[frame.number - 1].any())
 
 
-def test_every_part_of_a_method_can_be_exchanged(plume, draft) -> None:
+def test_every_part_of_a_method_can_be_exchanged(coarse, draft) -> None:
     """The loop asks each part for what it is for: here the temporal prior, which starts every frame alike.
 
     Parts compute on one thread of BLAS.
     """
-    always, threads = np.full_like(plume.densities[0], 0.5), []
+    always, threads = np.full(coarse.domain.resolution, 0.5, np.float32), []
 
     class Stubborn:
         def start(self, depth: Any, carried: np.ndarray, smooth: np.ndarray) -> Start:
@@ -338,7 +344,7 @@ def test_every_part_of_a_method_can_be_exchanged(plume, draft) -> None:
     method = Method(Idle(), default.depth_prior, default.velocity_estimator, Stubborn())
     with threadpool_limits(2, user_api="blas"):
         before = blas_threads()
-        frames = frames_of(plume.scene, draft, method, count=3)
+        frames = frames_of(coarse, draft, method, count=3)
         assert blas_threads() == before
     assert all(number == {1} for number in threads)
     assert frames[1].figures["transport"] == {}
@@ -347,7 +353,7 @@ def test_every_part_of_a_method_can_be_exchanged(plume, draft) -> None:
         np.testing.assert_array_equal(frame.density, always)
 
 
-def test_a_frame_that_is_let_go_takes_no_memory(plume, draft, tmp_path) -> None:
+def test_a_frame_that_is_let_go_takes_no_memory(coarse, draft, tmp_path) -> None:
     """While a frame is computed nothing holds the ones before: at large grids they would not fit together."""
     given: list[weakref.ref[Frame]] = []
     alive = []
@@ -357,8 +363,8 @@ def test_a_frame_that_is_let_go_takes_no_memory(plume, draft, tmp_path) -> None:
             alive.append(sum(frame() is not None for frame in given))
             return super().predict(velocity, dt)
 
-    with Clip.open(plume.scene.clip) as clip:
-        shot = prepare_shot(clip.part(0, 3), plume.scene.with_frames(0, 3), draft)
+    with Clip.open(coarse.clip) as clip:
+        shot = prepare_shot(clip.part(0, 3), coarse.with_frames(0, 3), draft)
         method = replace(compose(shot.settings), velocity_estimator=Watched(shot.settings.velocity))
         run = Reconstruction(shot, method)
         run.write(tmp_path / "out", npz=True, on_frame=lambda frame: given.append(weakref.ref(frame)))

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from smokelift import Velocity, estimate_velocity
+from smokelift import Velocity, _core, estimate_velocity
 from smokelift.baselines.velocity import PaperVelocity
 from smokelift.scene import SIDES, Camera, Domain
 from smokelift.transport import face_shapes
@@ -119,11 +119,11 @@ def test_units_do_not_matter(estimator):
 
 
 @BOTH
-def test_number_of_threads_does_not_matter(estimator, set_threads):
+def test_number_of_threads_does_not_matter(estimator):
     before, after, _ = rotation(0.1)
-    set_threads(2)
+    _core.set_threads(2)
     two = estimator.estimate(DensityPair(before, after, DT, VOXEL))
-    set_threads(1)
+    _core.set_threads(1)
     one = estimator.estimate(DensityPair(before, after, DT, VOXEL))
     for a, b in zip(two.faces, one.faces, strict=True):
         np.testing.assert_array_equal(a, b)
