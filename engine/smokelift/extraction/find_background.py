@@ -16,7 +16,7 @@ from smokelift.checks import Mask
 from smokelift.extraction.background_kind import MAX_DEVIATION, color_around, likeliest_background, within
 from smokelift.extraction.camera_motion import CameraMotion, Texture, find_motion, motion_before
 from smokelift.extraction.clear_picture import ClearPicture, clear_picture, spread_out, whole_plate
-from smokelift.extraction.given_background import mean_of_frames, read_background
+from smokelift.extraction.given_background import continued_color, mean_of_frames, read_background
 from smokelift.extraction.plate import Plate, cleared, finest_detail, known_plate, uncovered, without_noise_light
 from smokelift.extraction.proxy import PROXY_SIDE, Proxy
 from smokelift.extraction.strokes import PAINTED, Strokes, stroked
@@ -98,9 +98,12 @@ def find_background(clip: Clip, camera: Camera | None, background: Background | 
     if given is None:
         found = _estimated(clip, moves, None if strokes is None else strokes.smoke)
     else:
+        filmed = bool(frames)
+        if said.color is not None and gray is None and clip.mask is not None and not moves:
+            given, filmed = continued_color(np.array(said.color, np.float32), clip), True
 
         def known(clip: Clip) -> tuple[Plate, Clip]:
-            return known_plate(mean_of_frames(frames, clip) if frames else given, clip, filmed=bool(frames))
+            return known_plate(mean_of_frames(frames, clip) if frames else given, clip, filmed=filmed)
 
         plate, shown = known(clip)
         quiet = without_noise_light(clip, plate.noise)
@@ -121,9 +124,10 @@ def find_background(clip: Clip, camera: Camera | None, background: Background | 
             "Strokes are painted over one frame, but what is behind the smoke changes from frame to frame. Leave them "
             "out, or stabilize the clip and give one picture as background."
         )
-    one_color = said.color is not None or (said.estimated and found.source != "picture")
-    # a picture was found with what is painted as smoke
-    left = replace(strokes, smoke=np.zeros_like(strokes.smoke)) if found.source == "picture" else strokes
+    one_color = said.estimated and found.source != "picture"
+    # a picture was found with what is painted as smoke, and a color is given for what is behind it
+    behind = found.source == "picture" or said.color is not None
+    left = replace(strokes, smoke=np.zeros_like(strokes.smoke)) if behind else strokes
     plate, clip = stroked(left, plate, found.clip, one_color)
     return replace(found, clip=clip, plate=plate, background=said, strokes=strokes)
 

@@ -7,12 +7,32 @@ import numpy as np
 from smokelift.footage.clip import Clip
 from smokelift.footage.frame_source import ClipError
 from smokelift.footage.image_sequence import is_pattern, is_video
-from smokelift.footage.images import Picture, area_average, linear_to_srgb, read_image
+from smokelift.footage.images import (
+    Picture,
+    area_average,
+    channel_mean,
+    linear_to_srgb,
+    read_image,
+    reduced_size,
+    srgb_to_linear,
+)
+from smokelift.footage.inpainting import push_pull
+from smokelift.footage.noise import median_of_seen
 from smokelift.scene import Background, Camera, Scene, shared_part
 
 ALIKE, MIN_ALIKE_FRACTION = 8 / 255, 0.9
 """Difference in sRGB values up to which a pixel has a background's color, and smallest fraction of such pixels: the
 others are a nozzle, a floor, a logo."""
+
+SIDE, FRAMES = 160, 8
+"""Pixels along the longer side, and number, of the frames that a color is continued from: a color has no detail."""
+
+BELIEF = 0.08
+"""Standard deviation, in sRGB values, of what a given color stands for: a clear sky is off its mean by .2 at most. With
+.12 leaves below a sky are taken for it (docs/experiments/background.md)."""
+
+COLOR_WEIGHT = 1e-4
+"""Weight of the color itself in each pixel, beside that of a pixel that shows it."""
 
 
 def open_plates(background: Background | None, camera: Camera | None) -> Clip | None:
@@ -77,6 +97,24 @@ def behind(plate: Picture, own: Camera, camera: Camera) -> Picture:
     if part is None:
         return np.asarray(plate.mean((0, 1)))
     return area_average(area_average(plate, *own.size)[part], *camera.size)
+
+
+def continued_color(color: Picture, clip: Clip) -> Picture:
+    """Return a linear color (3,) as a picture (rows, columns, 3), as what is seen beside a clip's mask has it.
+
+    No smoke is there, so it shows how the color changes over the picture: that is continued behind the smoke. The more
+    it differs from the color, the likelier it is something else, such as a forest below the sky, and the less it says.
+    """
+    size, filmed, given = reduced_size(*clip.size, SIDE), clip.as_filmed(), linear_to_srgb(color)
+    changes = []
+    for number in clip.spread(FRAMES):
+        change = linear_to_srgb(filmed.stored(number).averaged(*size)) - given
+        changes.append(np.where(np.isnan(clip.as_seen(number, change)), change, np.float32(np.nan)))
+    beside = median_of_seen(np.stack(changes))
+    weight = np.nan_to_num(np.exp(-0.5 * channel_mean(np.square(beside)) / np.float32(BELIEF) ** 2))
+    total = weight + np.float32(COLOR_WEIGHT)
+    change = push_pull(np.nan_to_num(beside) * (weight / total)[..., None], np.minimum(total, 1))
+    return srgb_to_linear(np.maximum(given + area_average(change, *clip.size), 0))
 
 
 def single_color(plate: Picture) -> Picture | None:

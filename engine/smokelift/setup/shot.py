@@ -128,7 +128,8 @@ class Shot:
         if plate.images is not None or (background.image is not None and not painted):
             return None
         shown = plate if self.moves else uncovered(plate, self.clip)
-        return None if background.color is not None and not painted and shown is plate else shown.image
+        one_color = background.color is not None and not painted and self.clip.mask is None
+        return None if one_color else shown.image
 
     @property
     def inlets(self) -> tuple[Inlet, ...]:

@@ -13,6 +13,7 @@ from smokelift.extraction.find_background import find_background
 from smokelift.extraction.matte import matte
 from smokelift.footage.images import srgb_to_linear
 from smokelift.output.images import write_image
+from smokelift.scene import Background
 from tests.engine.films import COUNT, HEIGHT, WIDTH, clip_of, codes_apart, film, pan, plate_of, puff, wall
 
 
@@ -168,3 +169,55 @@ def test_a_single_picture_has_a_color_around_it() -> None:
     assert color_around(bars) is None
     bars[:10] = bars[-10:] = 0
     assert color_around(bars) is None
+
+
+SKY = np.linspace(0.35, 0.6, HEIGHT)[:, None, None] ** np.array([1.6, 1.2, 0.7]) * np.ones((1, WIDTH, 1))
+"""A sky that brightens downwards, linear."""
+
+FOREST = 3 * HEIGHT // 4
+"""First row of a forest below it."""
+
+
+def hinted(
+    folder: Path, plate: np.ndarray, color: np.ndarray, visible: np.ndarray, strokes: Path | None = None
+) -> tuple[Clip, FoundBackground]:
+    """Return a clip of thick smoke in the middle of a plate, and its background by a color, a mask, and strokes."""
+    rows, columns = np.mgrid[:HEIGHT, :WIDTH]
+    smoke = np.clip(1.5 - np.hypot(rows - 0.42 * HEIGHT, columns - WIDTH / 2) / 8, 0, 1)
+    film(folder, plate, lambda n: smoke * (1 - n / COUNT / 4), 0.8).close()
+    write_image(folder / "mask.png", visible.astype(np.float32))
+    clip = Clip.open(folder / "frame_###.png", mask=folder / "mask.png")
+    red, green, blue = map(float, color)
+    return clip, find_background(clip, None, Background(color=(red, green, blue), strokes=strokes))
+
+
+def test_a_color_goes_on_as_the_sky_beside_a_mask_does(tmp_path) -> None:
+    """The sky that a generous mask leaves free is no smoke, and the forest beside the mask is not behind the smoke."""
+    plate, visible = SKY.copy(), np.zeros((HEIGHT, WIDTH), np.bool_)
+    plate[FOREST:] = wall(0.1, 0.3)[FOREST:] * (0.5, 1, 0.4)
+    visible[6:FOREST, 8:-8] = True
+    clip, found = hinted(tmp_path, plate, SKY[visible].mean(0), visible)
+    with clip:
+        assert codes_apart(found.plate.image, SKY)[visible].mean() < 4
+        shown = matte(found.clip.frame(0), found.plate)
+        far = np.hypot(*(np.mgrid[:HEIGHT, :WIDTH] - np.array([0.42 * HEIGHT, WIDTH / 2])[:, None, None])) > 18
+        assert shown.mask[~far].any()
+        assert not shown.mask[visible & far].any()
+
+
+def test_before_one_color_nothing_changes_beside_a_mask(tmp_path) -> None:
+    plate, visible = np.broadcast_to((0.2, 0.4, 0.6), (HEIGHT, WIDTH, 3)), np.zeros((HEIGHT, WIDTH), np.bool_)
+    visible[6:-6, 8:-8] = True
+    clip, found = hinted(tmp_path, plate, plate[0, 0], visible)
+    clip.close()
+    assert codes_apart(found.plate.image, plate)[visible].max() < 1
+
+
+def test_smoke_painted_before_a_color_leaves_it_as_it_is_there(tmp_path) -> None:
+    visible = np.zeros((HEIGHT, WIDTH), np.bool_)
+    visible[6:-6, 8:-8] = True
+    write_image(tmp_path / "strokes.png", visible[..., None] * np.array([0, 1, 0], np.float32))
+    clip, painted = hinted(tmp_path, SKY, SKY[visible].mean(0), visible, tmp_path / "strokes.png")
+    plain = find_background(clip, None, replace(painted.background, strokes=None))
+    clip.close()
+    np.testing.assert_array_equal(painted.plate.image, plain.plate.image)
