@@ -1,11 +1,12 @@
 """Where in depth the smoke of one camera stands, by what shows it.
 
-One picture of smoke looks the same whether the smoke is near and small or far and large. Three cues show its place:
+One picture of smoke looks the same whether the smoke is near and small or far and large. Four cues show its place:
 
 - the box, which is put around its smoke: the mean depth is about its middle;
 - the base, where a column begins: a given distance or a marked inlet says its depth, else its contact with the floor;
 - the way up: a column that drifts across the picture drifts as far in depth, but nobody knows where to: there the box
-  alone speaks.
+  alone speaks;
+- the ceiling, where smoke reaches it and none shows above: rays over the middle of it meet only what stands nearer.
 
 Several cameras need none of them: `depth_prior` reads the axis from what they have in common.
 docs/experiments/density-axis.md has the worth of each cue.
@@ -23,6 +24,7 @@ from smokelift.density.upright_plane import (
     AxisEstimate,
     Cue,
     PlanePicture,
+    PlaneRays,
     SmokeAxis,
     depth_at,
     on_upright_plane,
@@ -144,12 +146,14 @@ def estimate_axis(
     else:
         columns = _floor_column(pictures, len(thicknesses), middle, camera, domain)
     if not columns:
-        return AxisEstimate(SmokeAxis.upright(), cue, 0.0, float(box))
+        axis = SmokeAxis.by_height(mean.heights, np.zeros_like(mean.heights))
+        return AxisEstimate(_under_ceiling(axis, pictures, camera, domain), cue, 0.0, float(box))
     # what drifts across the picture drifts in depth as well
     weights = [box**2 / (box**2 + column.drifts**2) for column in columns]
     trusts = [(1 - LEANING) * column.trust * weight for column, weight in zip(columns, weights, strict=True)]
     error = box * np.sqrt(1 - np.average(np.mean(trusts, 0), weights=total))
     axis = _axis(columns, [column.base * weight for column, weight in zip(columns, weights, strict=True)], mean)
+    axis = _under_ceiling(axis, pictures, camera, domain)
     depth = float(np.average(np.broadcast_to(axis.depths, mean.values.shape), weights=mean.values))
     if cue == "box" and columns[0].trust >= MIN_CONTACT_TRUST:
         cue = "floor contact"
@@ -220,6 +224,39 @@ def _floor_contact(
     front, middle, back = np.where(up < above, distance * up / np.maximum(above - up, 1e-9), np.inf)
     # a disc on the floor is as deep as it is wide; the lower end of what floats takes many more rows
     return (middle, width, begins) if abs(middle) < reach and back - front < width + pixel else None
+
+
+def _under_ceiling(axis: SmokeAxis, pictures: Sequence[PlanePicture], camera: Camera, domain: Domain) -> SmokeAxis:
+    """An axis that leads, from one width of the smoke below the ceiling, to where smoke stands that ends at it.
+
+    A ray over the middle of the ceiling meets only what stands before it. So the row that shows half of what there is
+    shows the smoke's middle, unless smoke goes on above: then the last rays that meet the domain show as much. Smoke that
+    stands behind the middle shows as if it ended below the ceiling, and is not moved (docs/experiments/density-axis.md).
+    """
+    rays, (_, along, up) = PlaneRays.of(camera, domain), view_frame(camera)
+    heights, ceiling = axis.heights, reach_along(domain, up)
+    eye = np.array(camera.matrix, np.float64)[:3, 3] - np.array(domain.centre)
+    distance, above = -float(eye @ along), ceiling - float(eye @ up)
+    last = rays.height[~rays.missed].max(initial=ceiling) - domain.voxel_size
+    if camera.type != "perspective" or last <= ceiling or distance <= 0 or above <= 0:
+        return axis
+    over, shown = heights >= ceiling, []
+    for picture in pictures:
+        total = picture.total
+        there, beyond = np.interp([ceiling, last], heights, total)
+        if there > 0:
+            width = 2 * np.sqrt(3) * np.interp(ceiling, heights, picture.spread)
+            below = (heights <= ceiling) & (heights >= ceiling - width / 2 - domain.voxel_size)
+            level = max(there, np.median(total[below]))
+            half = np.interp(-level / 2, -np.minimum.accumulate(total[over]), heights[over])
+            depth = distance * above / (half - ceiling + above) - distance
+            shown.append([depth, width, max(1 - beyond / there, 0), there])
+    if not shown:
+        return axis
+    *known, amounts = np.array(shown).T
+    depth, width, ends = np.average(known, 1, amounts)
+    weight = ends * np.exp(-((np.maximum(ceiling - heights, 0) / width) ** 2) / 2)[:, None]
+    return replace(axis, depths=(1 - weight) * axis.depths + weight * depth)
 
 
 def _inlet_columns(

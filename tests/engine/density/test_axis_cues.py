@@ -1,4 +1,4 @@
-"""Where in depth smoke stands: found by its contact with the floor, else on the domain's axis."""
+"""Where in depth smoke stands: found by its contacts with the floor and the ceiling, else on the domain's axis."""
 
 import numpy as np
 import pytest
@@ -57,6 +57,23 @@ def test_floating_smoke_is_left_on_the_axis(depth) -> None:
         distance = (X[:, None, None] ** 2 + (Y[None, :, None] - depth) ** 2 + (Z - low - 0.3) ** 2) ** 0.5
         ball = np.clip(1.5 - 4 * distance, 0, 1).astype(np.float32)
         assert not axis_of(seen(ball, ball), FRONT, BOX).depths.any()
+
+
+@pytest.mark.parametrize("depth", [-0.5, -0.25, 0.0, 0.25])
+def test_smoke_that_ends_at_the_ceiling_shows_its_depth_there(depth) -> None:
+    smoke = seen(*(column(depth, low=0.5, high=high) for high in (2.0, 3.0, 3.0)))
+    found = axis_of(smoke, FRONT, BOX)
+    # what stands behind the middle shows as if it ended below the ceiling
+    assert found.at(np.array([1.45])) == pytest.approx(min(depth, 0), abs=0.12)
+    assert abs(found.at(np.array([-0.5]))) < 0.05, "what is far below stays"
+
+
+def test_smoke_that_goes_on_above_the_ceiling_does_not_lean_there() -> None:
+    taller = Domain((-1, -1, 0), (1, 1, 4), (32, 32, 64))
+    smoke = np.pad(column(-0.25, low=0.5, high=3.0), ((0, 0), (0, 0), (0, 16)), mode="edge")
+    renderer = Optics(taller, Medium(extinction=1.0), (), "absorption").renderer(FRONT, np.ones(3))
+    found = axis_of([-np.log(renderer.image(smoke)[..., 0])], FRONT, BOX)
+    np.testing.assert_allclose(found.depths, 0, atol=0.03)
 
 
 def test_drifting_smoke_is_believed_less() -> None:
