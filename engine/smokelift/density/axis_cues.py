@@ -230,8 +230,8 @@ def _under_ceiling(axis: SmokeAxis, pictures: Sequence[PlanePicture], camera: Ca
     """An axis that leads, from one width of the smoke below the ceiling, to where smoke stands that ends at it.
 
     A ray over the middle of the ceiling meets only what stands before it. So the row that shows half of what there is
-    shows the smoke's middle, unless smoke goes on above: then the last rays that meet the domain show as much. Smoke that
-    stands behind the middle shows as if it ended below the ceiling, and is not moved (docs/experiments/density-axis.md).
+    shows the smoke's middle, unless smoke goes on above: then the last rays that meet the domain show as much. What
+    stands behind the middle shows as if it ended below the ceiling, and stays (docs/experiments/density-axis.md).
     """
     rays, (_, along, up) = PlaneRays.of(camera, domain), view_frame(camera)
     heights, ceiling = axis.heights, reach_along(domain, up)
