@@ -193,6 +193,12 @@ def test_a_backlit_silhouette_needs_no_light(plume, draft, tmp_path) -> None:
             shot_of(silhouette, replace(draft, scattering=model))
 
 
+def test_without_smoke_nothing_is_measured(plume, draft, tmp_path) -> None:
+    shot = shot_of(plume.write(tmp_path, [0 * plume.densities[0]] * 3), draft)
+    assert shot.scene.scattering == "single"
+    assert "scattering" not in [choice.about for choice in shot.findings]
+
+
 # environments
 
 
