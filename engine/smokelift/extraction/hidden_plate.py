@@ -6,9 +6,10 @@ them it has to be a mixture of smoke and plate, S = (1 - T) J, whatever T, and i
 above and below it, or on its sides, unless it is an object there. Its detail is that of one of the frames, and what
 smoke leaves of it in the others has to be T times as strong. Then what an element leaves of a picture,
 (I - S) / T, is the plate's; the clearest frame says it best. Smoke that stands from the first frame to the last shows
-next to nothing, and what is behind it stays as it was. J is first what brightens the plate most, or what is found
-before the plate as it is, whichever makes the frames likelier. It is found again from the plate that the turns end
-with, and the plate with it, as long as the frames become likelier still.
+next to nothing, and what is behind it stays as it was. A person or an animal may have been elsewhere in other frames
+than those in use: before and after them each cell of the plate may change once. J is first what brightens the plate
+most, or what is found before the plate as it is, whichever makes the frames likelier. It is found again from the plate
+that the turns end with, and the plate with it, as long as the frames become likelier still.
 """
 
 from collections.abc import Callable, Sequence
@@ -67,9 +68,13 @@ DETAIL_WEIGHT = 0.2
 """Weight of what detail leaves unexplained, beside colors of cells: T of elements of five composed clips is off by
 .185, .176 and .190 with 0, .2 and 1 (docs/experiments/hidden-plate.md)."""
 
-INDEPENDENT = 3
-"""Number of independent frames that the frames count as: errors of smoke last (.75 to .95 from a frame to the next)
-(docs/experiments/hidden-plate.md)."""
+ERRORS_LAST = 0.5625
+"""Seconds after which a frame's errors of smoke are others: they last (.75 to .95 from a frame to the next), and eight
+frames of 28, of 1/24 s, count as three (docs/experiments/hidden-plate.md)."""
+
+CHANGES = 0.01
+"""Changes of a cell of the plate per second. More often smoke that came lately is taken for a plate that changed: steam
+of a pan with .03 and .1, a puff with 1 (docs/experiments/hidden-plate.md)."""
 
 MIN_UNKNOWN = 0.01
 """Smallest fraction of a plate that has to be unknown for turns to change the smoke."""
@@ -84,11 +89,12 @@ def plate_and_source(clip: Clip, uncut: Clip, plate: Plate, smoky: Sequence[int]
     ``uncut`` is all of that file between two cuts. Both clips are at the plate's exposure; ``smoky`` are frames of the
     clip, those with the most smoke first.
     """
-    thickest = SomeFrames.of(clip, plate, sorted(smoky[:SOURCE_FRAMES]), SOURCE_SIDE, MAX_CELLS)
+    most = sorted(smoky[:SOURCE_FRAMES])
+    thickest = SomeFrames.of(clip, plate, most, np.zeros(len(most)), SOURCE_SIDE, MAX_CELLS)
     seen = thickest.against(thickest.plate)
     if plate.images is not None or is_known(plate):
         return plate, source_in(seen)
-    frames = SomeFrames.of(uncut, plate, uncut.spread(FRAMES), SIDE)
+    frames = SomeFrames.of(uncut, plate, *_about(clip, uncut), SIDE)
     starts = [likeliest_plate(frames, source) for source in (first_source(seen), source_in(seen))]
     turned = in_turn(frames, min(starts, key=lambda start: start.loss))
     for _ in range(SOURCES):
@@ -97,6 +103,17 @@ def plate_and_source(clip: Clip, uncut: Clip, plate: Plate, smoky: Sequence[int]
             break
         turned = in_turn(frames, start)
     return frames.with_plate(plate, turned), turned.source
+
+
+def _about(clip: Clip, uncut: Clip) -> tuple[list[int], NDArray[np.float64]]:
+    """Frames spread over a clip's file, of which the clip has one at least, and their seconds after the clip."""
+    spread = np.array(uncut.spread(FRAMES))
+    first, last = clip.numbers[0] - uncut.numbers[0], clip.numbers[-1] - uncut.numbers[0]
+    away = spread - np.clip(spread, first, last)
+    if away.all():
+        nearest = np.abs(away).argmin()
+        spread[nearest], away[nearest] = (first + last) // 2, 0
+    return spread.tolist(), away / uncut.fps
 
 
 def is_known(plate: Plate) -> bool:
@@ -123,22 +140,32 @@ class HiddenPlate:
 class SomeFrames:
     """Some frames of a clip and its plate, of some pixels to a cell.
 
-    ``cells`` are the numbers of columns and rows of cells.
+    ``away`` (frames,) are their seconds after the part of the clip in use, negative before it; ``cells`` are the
+    numbers of columns and rows of cells.
     """
 
     clip: Clip
     numbers: Sequence[int]
+    away: NDArray[np.float64]
     pictures: Sequence[Picture]
     plate: Plate
     cells: tuple[int, int]
 
     @staticmethod
-    def of(clip: Clip, plate: Plate, numbers: Sequence[int], side: int, detail_of: int = 0) -> "SomeFrames":
+    def of(
+        clip: Clip, plate: Plate, numbers: Sequence[int], away: NDArray[np.float64], side: int, detail_of: int = 0
+    ) -> "SomeFrames":
         """Read frames at their plate's exposure, for so many cells along the longer ``side``; see `compared_size`."""
         cells = reduced_size(*clip.size, side)
         size = compared_size(cells, clip.size, plate.finest, detail_of)
         pictures = [clip.stored(frame).averaged(*size) for frame in numbers]
-        return SomeFrames(clip, numbers, pictures, resized(plate, size), cells)
+        return SomeFrames(clip, numbers, away, pictures, resized(plate, size), cells)
+
+    @property
+    def independent(self) -> float:
+        """How many independent frames each of them counts as."""
+        seconds = (self.numbers[-1] - self.numbers[0]) / self.clip.fps
+        return min(1.0, (1 + seconds / ERRORS_LAST) / len(self.numbers))
 
     def against(self, plate: Plate) -> list[Cells]:
         """Return the cells of the frames against a plate of their size."""
@@ -165,8 +192,9 @@ def in_turn(frames: SomeFrames, start: HiddenPlate) -> HiddenPlate:
     for _ in range(TURNS):
         found = replace(plate, image=_changed(plate, turned.image - behind))
         best, clearest = np.zeros_like(start.left), start.image
-        for cells in frames.against(found):
+        for cells, away in zip(frames.against(found), frames.away, strict=True):
             shown, weight = _shown(cells, start.source)
+            weight *= np.exp(-CHANGES * abs(away))
             # errors of smoke are much the same in all frames, so a mean of frames is no better than the best of them
             best, clearest = np.maximum(best, weight), np.where(weight > best, shown, clearest)
         left = 1 / (1 + variance * best)
@@ -217,6 +245,10 @@ def likeliest_plate(frames: SomeFrames, source: Picture) -> HiddenPlate:
     best, least = np.zeros(len(nearby), np.int64), np.full(len(nearby), np.inf)
     away = [values - source for values, _ in seen]
     spread = np.square(BRIGHTNESS_RANGE)
+    # another plate has any color
+    another = np.log(np.maximum(high - low, EIGHT_BIT_STEP)).sum()
+    another = another - 1.5 * np.log(2 * np.pi * np.mean([noise for _, noise in seen], axis=0))
+    losses = np.zeros((len(seen), len(nearby)))
     for index, (color, smooth, number, clear) in enumerate(hypotheses):
         loss = _prior_loss(smooth, expected, plate.errors, high - low)
         loss += 1.5 * DETAIL_WEIGHT * products[number][number] / (clear**2 * usual)
@@ -235,8 +267,8 @@ def likeliest_plate(frames: SomeFrames, source: Picture) -> HiddenPlate:
                 detail = products[frame][frame] - 2 * left * products[number][frame]
                 detail += left**2 * products[number][number]
                 squares = np.minimum(squares, misfit + 3 * DETAIL_WEIGHT * detail)
-            outliers = np.log1p(squares / noise / OUTLIER_FREEDOM)
-            loss += INDEPENDENT / FRAMES * 0.5 * (OUTLIER_FREEDOM + 3) * outliers
+            losses[frame] = 0.5 * (OUTLIER_FREEDOM + 3) * np.log1p(squares / noise / OUTLIER_FREEDOM)
+        loss += _over_time(frames.independent * losses, frames.away, another)
         loss = around(loss)
         best, least = np.where(loss < least, index, best), np.minimum(loss, least)
     image, factors = start.copy(), np.zeros((len(pictures), *where.shape), np.float32)
@@ -247,6 +279,23 @@ def likeliest_plate(frames: SomeFrames, source: Picture) -> HiddenPlate:
         if hypothesis.frame >= 0:
             factors[hypothesis.frame][taken] = 1 / hypothesis.clear
     return HiddenPlate(image, source, float(least.mean()), list(factors), np.ones_like(image[..., :1]))
+
+
+def _over_time(
+    losses: NDArray[np.float64], away: NDArray[np.float64], another: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """The loss (n,) of a plate by its ``losses`` (frames, n) in frames so many seconds ``away`` from the clip in use.
+
+    Before and after the clip it may have changed once: frames beyond tell nothing of it, at the loss of ``another``.
+    """
+    total: NDArray[np.float64] = losses[away == 0].sum(0)
+    for side in (np.flatnonzero(away < 0), np.flatnonzero(away > 0)[::-1]):  # the farthest first
+        loss = np.zeros_like(total)
+        for frame, seconds in zip(side, -np.diff(np.abs(away[side]), append=0), strict=True):
+            changed = another - np.log(-np.expm1(-CHANGES * seconds))
+            loss = np.minimum(loss + losses[frame] + CHANGES * seconds, changed)
+        total += loss
+    return total
 
 
 def _hypotheses(

@@ -18,8 +18,10 @@ X, Y = np.meshgrid(np.arange(COLUMNS), np.arange(ROWS))
 class Pictures:
     """A clip of linear pictures; what `SomeFrames` reads of one."""
 
-    def __init__(self, pictures: list[Picture]) -> None:
-        self.pictures, self.size = pictures, (COLUMNS, ROWS)
+    fps, size = 24.0, (COLUMNS, ROWS)
+
+    def __init__(self, pictures: list[Picture], first: int = 0) -> None:
+        self.pictures, self.numbers = pictures, range(first, first + len(pictures))
 
     def spread(self, count: int) -> range:
         return range(min(count, len(self.pictures)))
@@ -56,7 +58,7 @@ def continued(behind: Picture) -> Plate:
 
 
 def after_turns(clip: Pictures, plate: Plate, source: Picture) -> Plate:
-    frames = SomeFrames.of(clip, plate, range(FRAMES), SIDE)
+    frames = SomeFrames.of(clip, plate, range(FRAMES), np.zeros(FRAMES), SIDE)
     return frames.with_plate(plate, in_turn(frames, likeliest_plate(frames, source)))
 
 
@@ -125,7 +127,7 @@ def test_detail_of_smoke_is_not_that_of_a_smooth_wall() -> None:
 def test_frames_are_likeliest_with_the_smokes_own_source() -> None:
     behind = wall()
     clip = filmed(behind, list(np.linspace(40, 152, FRAMES)), 3.0)
-    frames = SomeFrames.of(clip, continued(behind), range(FRAMES), SIDE)
+    frames = SomeFrames.of(clip, continued(behind), range(FRAMES), np.zeros(FRAMES), SIDE)
     own, dim, bright = (likeliest_plate(frames, factor * SOURCE).loss for factor in np.float32((1, 0.4, 2.5)))
     assert own < min(dim, bright)
 
@@ -155,3 +157,15 @@ def test_thick_smoke_that_stays_leaves_a_plate_as_it_was() -> None:
 def test_a_plate_without_errors_is_known(change) -> None:
     plate = continued(wall())
     assert is_known(replace(plate, **change)) and not is_known(plate)
+
+
+def test_what_moves_is_where_the_frames_in_use_show_it() -> None:
+    """A post that stood before the middle until a second before the last two frames, in which smoke is thin."""
+    behind, post = wall(), wall()
+    post[:, 84:108] *= np.array([0.2, 0.3, 1.5], "f4")
+    centers = list(np.linspace(40, 152, FRAMES))
+    clip = filmed(post, centers, 0.7)
+    clip.fps, clip.pictures[-2:] = 1.0, filmed(behind, centers[-2:], 0.7).pictures
+    plate = continued(behind)
+    better, _ = plate_and_source(Pictures(clip.pictures[-2:], FRAMES - 2), clip, plate, (0, 1))
+    assert off(better, behind) < 0.5 * off(plate, behind)
