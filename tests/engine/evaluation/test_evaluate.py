@@ -112,6 +112,7 @@ def test_the_truth_beside_itself_with_another_view(perfect, truth, side, tmp_pat
     assert [(view["name"], view["size"]) for view in found["views"]] == [("input", [40, 56]), ("camera", [40, 56])]
     assert all(view["psnr"] is None or view["psnr"] > 50 for view in found["views"])
     assert found["views"][1]["ssim"] > 0.999
+    assert found["orbit"]["patches"] < 1e-3 and found["orbit"]["flicker"] == pytest.approx(1, abs=0.01)
     with Image.open(tmp_path / "a.png") as sheet:
         pixels = np.asarray(sheet).astype(int)
     first, second = (pixels[top : top + 240, : pixels.shape[1] // 10] for top in (32, 32 + 240 + 20))
