@@ -72,6 +72,9 @@ LEANING = 0.2
 """Fraction of the box's variance that stays of a column whose base is known: it may lean
 (docs/experiments/density-axis.md)."""
 
+SPECK = 0.05
+"""Fraction of the largest row from which a row shows smoke, not specks; as for the floor's contact."""
+
 WIDENING = 0.15
 """Growth of a column's radius per meter of height: it takes in air."""
 
@@ -147,17 +150,24 @@ def estimate_axis(
         columns = _floor_column(pictures, len(thicknesses), middle, camera, domain)
     if not columns:
         axis = SmokeAxis.by_height(mean.heights, np.zeros_like(mean.heights))
-        return AxisEstimate(_under_ceiling(axis, pictures, camera, domain), cue, 0.0, float(box))
+        axis = _under_ceiling(axis, pictures, camera, domain)
+        return AxisEstimate(axis, cue, _mean_depth(axis, mean), float(box))
     # what drifts across the picture drifts in depth as well
     weights = [box**2 / (box**2 + column.drifts**2) for column in columns]
     trusts = [(1 - LEANING) * column.trust * weight for column, weight in zip(columns, weights, strict=True)]
     error = box * np.sqrt(1 - np.average(np.mean(trusts, 0), weights=total))
     axis = _axis(columns, [column.base * weight for column, weight in zip(columns, weights, strict=True)], mean)
-    axis = _under_ceiling(axis, pictures, camera, domain)
-    depth = float(np.average(np.broadcast_to(axis.depths, mean.values.shape), weights=mean.values))
+    if cue == "box":
+        axis = _under_ceiling(axis, pictures, camera, domain)
+    depth = _mean_depth(axis, mean)
     if cue == "box" and columns[0].trust >= MIN_CONTACT_TRUST:
         cue = "floor contact"
     return AxisEstimate(axis, cue, depth, float(error))
+
+
+def _mean_depth(axis: SmokeAxis, mean: PlanePicture) -> float:
+    """Mean depth (m) of the smoke of a picture that stands on an axis."""
+    return float(np.average(np.broadcast_to(axis.depths, mean.values.shape), weights=mean.values))
 
 
 @dataclass(frozen=True, eq=False)
@@ -237,18 +247,20 @@ def _under_ceiling(axis: SmokeAxis, pictures: Sequence[PlanePicture], camera: Ca
     heights, ceiling = axis.heights, reach_along(domain, up)
     eye = np.array(camera.matrix, np.float64)[:3, 3] - np.array(domain.centre)
     distance, above = -float(eye @ along), ceiling - float(eye @ up)
-    last = rays.height[~rays.missed].max(initial=ceiling) - domain.voxel_size
-    if camera.type != "perspective" or last <= ceiling or distance <= 0 or above <= 0:
+    # of every column of pixels the last ray that meets the domain
+    lasts = np.where(rays.missed, -np.inf, rays.height).max(0)
+    last = lasts[np.isfinite(lasts)].min(initial=np.inf) - domain.voxel_size
+    if camera.type != "perspective" or abs(up[2]) < 1 or distance <= 0 or above <= 0 or not ceiling < last < np.inf:
         return axis
     over, shown = heights >= ceiling, []
     for picture in pictures:
         total = picture.total
-        there, beyond = np.interp([ceiling, last], heights, total)
-        if there > 0:
-            width = 2 * np.sqrt(3) * np.interp(ceiling, heights, picture.spread)
-            below = (heights <= ceiling) & (heights >= ceiling - width / 2 - domain.voxel_size)
-            level = max(there, np.median(total[below]))
-            half = np.interp(-level / 2, -np.minimum.accumulate(total[over]), heights[over])
+        there, beyond = np.interp([ceiling, last], heights, total)  # at the ceiling's middle, and at its front edge
+        width = max(2 * np.sqrt(3) * np.interp(ceiling, heights, picture.spread), domain.voxel_size)
+        below = np.median(total[(heights <= ceiling) & (heights >= ceiling - width / 2 - domain.voxel_size)])
+        # a ray to the middle meets half of what stands there, and a speck is no column
+        if there > max(below / 2, SPECK * total.max()):
+            half = np.interp(-max(there, below) / 2, -np.minimum.accumulate(total[over]), heights[over])
             depth = distance * above / (half - ceiling + above) - distance
             shown.append([depth, width, max(1 - beyond / there, 0), there])
     if not shown:

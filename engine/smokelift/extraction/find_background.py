@@ -100,7 +100,8 @@ def find_background(clip: Clip, camera: Camera | None, background: Background | 
     else:
         filmed = bool(frames)
         if said.color is not None and gray is None and clip.mask is not None and not moves:
-            given, filmed = continued_color(np.array(said.color, np.float32), clip), True
+            continued = continued_color(np.array(said.color, np.float32), clip)
+            given, filmed = (given, False) if continued is None else (continued, True)
 
         def known(clip: Clip) -> tuple[Plate, Clip]:
             return known_plate(mean_of_frames(frames, clip) if frames else given, clip, filmed=filmed)

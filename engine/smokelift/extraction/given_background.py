@@ -31,6 +31,13 @@ BELIEF = 0.08
 """Standard deviation, in sRGB values, of what a given color stands for: a clear sky is off its mean by .2 at most. With
 .12 leaves below a sky are taken for it (docs/experiments/background.md)."""
 
+FARTHEST = 0.2
+"""Difference, in sRGB values, from which on something else is seen: so far a clear sky is off its mean."""
+
+MIN_BESIDE = 0.02
+"""Smallest fraction of the picture that has the color beside a mask where that is to show how the color goes on. A
+mask's edge, a pixel wide, of half of the picture is 1.8 %."""
+
 COLOR_WEIGHT = 1e-4
 """Weight of the color itself in each pixel, beside that of a pixel that shows it."""
 
@@ -99,11 +106,12 @@ def behind(plate: Picture, own: Camera, camera: Camera) -> Picture:
     return area_average(area_average(plate, *own.size)[part], *camera.size)
 
 
-def continued_color(color: Picture, clip: Clip) -> Picture:
+def continued_color(color: Picture, clip: Clip) -> Picture | None:
     """Return a linear color (3,) as a picture (rows, columns, 3), as what is seen beside a clip's mask has it.
 
     No smoke is there, so it shows how the color changes over the picture: that is continued behind the smoke. The more
     it differs from the color, the likelier it is something else, such as a forest below the sky, and the less it says.
+    None where hardly anything there has the color.
     """
     size, filmed, given = reduced_size(*clip.size, SIDE), clip.as_filmed(), linear_to_srgb(color)
     changes = []
@@ -111,7 +119,10 @@ def continued_color(color: Picture, clip: Clip) -> Picture:
         change = linear_to_srgb(filmed.stored(number).averaged(*size)) - given
         changes.append(np.where(np.isnan(clip.as_seen(number, change)), change, np.float32(np.nan)))
     beside = median_of_seen(np.stack(changes))
-    weight = np.nan_to_num(np.exp(-0.5 * channel_mean(np.square(beside)) / np.float32(BELIEF) ** 2))
+    away = np.sqrt(channel_mean(np.square(beside)))
+    if np.count_nonzero(away < ALIKE) < MIN_BESIDE * away.size:
+        return None
+    weight = np.where(away < FARTHEST, np.exp(-0.5 * np.square(away / np.float32(BELIEF))), np.float32(0))
     total = weight + np.float32(COLOR_WEIGHT)
     change = push_pull(np.nan_to_num(beside) * (weight / total)[..., None], np.minimum(total, 1))
     return srgb_to_linear(np.maximum(given + area_average(change, *clip.size), 0))

@@ -94,7 +94,7 @@ def plate_and_source(clip: Clip, uncut: Clip, plate: Plate, smoky: Sequence[int]
     seen = thickest.against(thickest.plate)
     if plate.images is not None or is_known(plate):
         return plate, source_in(seen)
-    frames = SomeFrames.of(uncut, plate, *_about(clip, uncut), SIDE)
+    frames = SomeFrames.of(uncut, plate, *_frames_about(clip, uncut), SIDE)
     starts = [likeliest_plate(frames, source) for source in (first_source(seen), source_in(seen))]
     turned = in_turn(frames, min(starts, key=lambda start: start.loss))
     for _ in range(SOURCES):
@@ -105,8 +105,8 @@ def plate_and_source(clip: Clip, uncut: Clip, plate: Plate, smoky: Sequence[int]
     return frames.with_plate(plate, turned), turned.source
 
 
-def _about(clip: Clip, uncut: Clip) -> tuple[list[int], NDArray[np.float64]]:
-    """Frames spread over a clip's file, of which the clip has one at least, and their seconds after the clip."""
+def _frames_about(clip: Clip, uncut: Clip) -> tuple[list[int], NDArray[np.float64]]:
+    """Frames spread over a file, one of the clip at least, and their seconds after it: negative before, 0 in it."""
     spread = np.array(uncut.spread(FRAMES))
     first, last = clip.numbers[0] - uncut.numbers[0], clip.numbers[-1] - uncut.numbers[0]
     away = spread - np.clip(spread, first, last)
@@ -245,9 +245,9 @@ def likeliest_plate(frames: SomeFrames, source: Picture) -> HiddenPlate:
     best, least = np.zeros(len(nearby), np.int64), np.full(len(nearby), np.inf)
     away = [values - source for values, _ in seen]
     spread = np.square(BRIGHTNESS_RANGE)
-    # another plate has any color
+    # another plate has any color, and explains no frame better than this one could
     another = np.log(np.maximum(high - low, EIGHT_BIT_STEP)).sum()
-    another = another - 1.5 * np.log(2 * np.pi * np.mean([noise for _, noise in seen], axis=0))
+    another = np.maximum(another - 1.5 * np.log(2 * np.pi * np.mean([noise for _, noise in seen], axis=0)), 0)
     losses = np.zeros((len(seen), len(nearby)))
     for index, (color, smooth, number, clear) in enumerate(hypotheses):
         loss = _prior_loss(smooth, expected, plate.errors, high - low)

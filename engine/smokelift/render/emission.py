@@ -67,7 +67,8 @@ def _samples(
     Plane by plane from the camera on, as far as voxels (nx, ny, nz) burn. Voxels are numbers in a volume with a border
     of one.
     """
-    rays, padded, box = camera_rays(camera, optics.domain), np.pad(density, 1), box_around(burning, 0)
+    rays, box = camera_rays(camera, optics.domain), box_around(burning, 0)
+    padded = np.ascontiguousarray(np.pad(density, 1))
     strides, smoke = np.array(padded.strides) // padded.itemsize, padded.ravel()
     for part in np.array_split(np.arange(len(pixels)), len(pixels) // BAND + 1):
         of_part = pixels[part]

@@ -121,14 +121,14 @@ class Shot:
     def found_background(self) -> Image | None:
         """Full picture (rows, columns, 3) behind the smoke; None where the scene has it, or one for every frame.
 
-        Where a mask hides all frames it is the clip's own, before one color, too.
+        Before one color it is that only where a mask tells how the color goes on.
         """
         plate, background = self.views[0].plate, self.scene.background
         painted = background.strokes is not None
         if plate.images is not None or (background.image is not None and not painted):
             return None
         shown = plate if self.moves else uncovered(plate, self.clip)
-        one_color = background.color is not None and not painted and self.clip.mask is None
+        one_color = background.color is not None and not painted and (self.moves or self.clip.mask is None)
         return None if one_color else shown.image
 
     @property

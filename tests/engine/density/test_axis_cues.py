@@ -1,5 +1,7 @@
 """Where in depth smoke stands: found by its contacts with the floor and the ceiling, else on the domain's axis."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ from smokelift.render import Optics
 from smokelift.scene import Camera, Domain, Inlet, Medium
 
 BOX = Domain((-1, -1, 0), (1, 1, 3), (32, 32, 48))
+TALLER = Domain((-1, -1, 0), (1, 1, 4), (32, 32, 64))
 FRONT = Camera.look_at((0, -7, 1.5), (0, 0, 1.5), fov_y_degrees=30, size=(75, 113))
 X, Y, Z = (low + (np.arange(n) + 0.5) / 16 for low, n in zip(BOX.min, BOX.resolution, strict=True))
 
@@ -69,11 +72,36 @@ def test_smoke_that_ends_at_the_ceiling_shows_its_depth_there(depth) -> None:
 
 
 def test_smoke_that_goes_on_above_the_ceiling_does_not_lean_there() -> None:
-    taller = Domain((-1, -1, 0), (1, 1, 4), (32, 32, 64))
     smoke = np.pad(column(-0.25, low=0.5, high=3.0), ((0, 0), (0, 0), (0, 16)), mode="edge")
-    renderer = Optics(taller, Medium(extinction=1.0), (), "absorption").renderer(FRONT, np.ones(3))
+    renderer = Optics(TALLER, Medium(extinction=1.0), (), "absorption").renderer(FRONT, np.ones(3))
     found = axis_of([-np.log(renderer.image(smoke)[..., 0])], FRONT, BOX)
     np.testing.assert_allclose(found.depths, 0, atol=0.03)
+
+
+def test_inlets_and_a_distance_are_surer_than_the_ceiling() -> None:
+    smoke = seen(column(0.3, low=0.5, high=3.0))
+    for known in ((FRONT, BOX, [Inlet((0.2, 0.3, 0.6), 0.25)]), (FRONT, BOX, (), 0.3)):
+        assert axis_of(smoke, *known).at(np.array([1.45])) == pytest.approx(0.3, abs=0.05)
+
+
+def test_a_thread_and_specks_under_the_ceiling() -> None:
+    thread, specks = (np.zeros((75, 113)[::-1], np.float32) for _ in range(2))
+    thread[:60, 37] = 1.0
+    assert np.isfinite(axis_of([thread], FRONT, BOX).depths).all()
+    (specks,) = seen(column(0.3, low=0.5, high=2.7))
+    specks[:9:4, 30] += 0.02
+    np.testing.assert_allclose(axis_of([specks], FRONT, BOX).depths, 0, atol=0.03)
+
+
+def test_what_a_rolled_picture_cuts_does_not_end_at_the_ceiling() -> None:
+    roll, matrix = np.radians(10), np.array(FRONT.matrix)
+    turn = np.array([[np.cos(roll), -np.sin(roll), 0], [np.sin(roll), np.cos(roll), 0], [0, 0, 1]])
+    matrix[:3, :3] = matrix[:3, :3] @ turn
+    rolled = replace(FRONT, matrix=tuple(map(tuple, matrix.tolist())))
+    smoke = np.pad(column(-0.25, low=0.5, high=3.0), ((0, 0), (0, 0), (0, 16)), mode="edge")
+    renderer = Optics(TALLER, Medium(extinction=1.0), (), "absorption").renderer(rolled, np.ones(3))
+    found = axis_of([-np.log(renderer.image(smoke)[..., 0])], rolled, BOX)
+    np.testing.assert_allclose(found.depths, 0, atol=0.06)
 
 
 def test_drifting_smoke_is_believed_less() -> None:

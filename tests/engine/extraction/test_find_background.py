@@ -213,6 +213,16 @@ def test_before_one_color_nothing_changes_beside_a_mask(tmp_path) -> None:
     assert codes_apart(found.plate.image, plate)[visible].max() < 1
 
 
+def test_a_color_that_nothing_beside_a_mask_has_stays(tmp_path) -> None:
+    """A gray wall that fills the mask, in a darker frame."""
+    plate, visible = np.full((HEIGHT, WIDTH, 3), 0.2), np.zeros((HEIGHT, WIDTH), np.bool_)
+    visible[6:-6, 8:-8] = True
+    plate[visible] = 0.3
+    clip, found = hinted(tmp_path, plate, plate[HEIGHT // 2, WIDTH // 2], visible)
+    clip.close()
+    np.testing.assert_allclose(found.plate.image[visible], 0.3, atol=1e-6)
+
+
 def test_smoke_painted_before_a_color_leaves_it_as_it_is_there(tmp_path) -> None:
     visible = np.zeros((HEIGHT, WIDTH), np.bool_)
     visible[6:-6, 8:-8] = True

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from smokelift import Clip
+from smokelift import Background, Clip
 from smokelift.extraction.find_background import find_background
 from smokelift.extraction.plate import Plate, cleared, known_plate, uncovered
 from smokelift.footage.frame_source import ClipError
@@ -161,6 +161,8 @@ def test_what_is_hidden_all_the_time_is_shown_as_it_was_filmed(tmp_path, mask, d
         assert middle == pytest.approx(1 + drift / 2, abs=0.05)
         assert codes_apart(found.image / middle, wall(0.3, 0.5)).max() < 5
         assert found.confidence[:, SIDE + 4 :].mean() > 0.9
+        given = find_background(clip, None, Background(color=(0.1, 0.1, 0.1))).plate.at(0)
+        np.testing.assert_allclose(given.image, 0.1, atol=1e-6)
     with Clip.open(file) as clip:
         assert uncovered(found, clip) is found
 

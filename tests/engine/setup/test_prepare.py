@@ -164,6 +164,14 @@ def test_the_clip_is_behind_the_smoke_where_a_mask_hides_it(plume, draft, tmp_pa
     assert shot.found_background[:, 8:].max() < 0.01
 
 
+def test_a_color_behind_a_moving_camera_stays_one_with_a_mask(tracked, draft, tmp_path) -> None:
+    visible = np.zeros((56, 40, 3), np.float32)
+    visible[4:-4, 4:-4] = 1
+    write_image(tmp_path / "mask.png", visible)
+    clip = replace(tracked.clip, mask=tmp_path / "mask.png")
+    assert shot_of(replace(tracked, clip=clip, background=Background()), draft).found_background is None
+
+
 def test_a_background_that_moves_must_be_given(tracked, draft, tmp_path) -> None:
     for n in range(5):
         stripes = np.broadcast_to((0.2 + 0.1 * np.sin(np.arange(40) + n))[:, None], (56, 40, 3))
