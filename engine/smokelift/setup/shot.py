@@ -119,10 +119,7 @@ class Shot:
 
     @cached_property
     def found_background(self) -> Image | None:
-        """Full picture (rows, columns, 3) behind the smoke; None where the scene has it, or one for every frame.
-
-        Before one color it is that only where a mask tells how the color goes on.
-        """
+        """Picture (rows, columns, 3) behind the smoke; None where the scene has it, or one a frame, or one color."""
         plate, background = self.views[0].plate, self.scene.background
         painted = background.strokes is not None
         if plate.images is not None or (background.image is not None and not painted):
