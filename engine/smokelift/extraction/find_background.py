@@ -1,10 +1,11 @@
 """What stands behind the smoke of a clip, and how it is decided.
 
-The first of these that applies: what an alpha channel says; what the scene gives; one color, if the whole file makes
-it the likeliest (`background_kind`); the picture that the clear frames show (`clear_picture`); black, if they show
-next to nothing. If the camera moves before a picture, the frames are registered (`camera_motion`), or the clip is
-refused; one color is the same wherever it points. The clip's noise is measured first, on what cannot be smoke
-(`noise`). Strokes of the scene change what was found (`strokes`); an alpha channel leaves nothing for them to say.
+The first of these that applies: what an alpha channel says; what the scene gives, a color as it goes on beside the mask
+(`given_background`); one color, if the whole file makes it the likeliest (`background_kind`); the picture that the
+clear frames show (`clear_picture`); black, if they show next to nothing. If the camera moves before a picture, the
+frames are registered (`camera_motion`), or the clip is refused; one color is the same wherever it points. The clip's
+noise is measured first, on what cannot be smoke (`noise`). Strokes of the scene change what was found (`strokes`); an
+alpha channel leaves nothing for them to say.
 """
 
 from dataclasses import dataclass, replace
@@ -101,7 +102,8 @@ def find_background(clip: Clip, camera: Camera | None, background: Background | 
         filmed = bool(frames)
         if said.color is not None and gray is None and clip.mask is not None and not moves:
             continued = continued_color(np.array(said.color, np.float32), clip)
-            given, filmed = (given, False) if continued is None else (continued, True)
+            if continued is not None:
+                given, filmed = continued, True
 
         def known(clip: Clip) -> tuple[Plate, Clip]:
             return known_plate(mean_of_frames(frames, clip) if frames else given, clip, filmed=filmed)

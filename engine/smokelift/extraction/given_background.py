@@ -27,7 +27,7 @@ others are a nozzle, a floor, a logo."""
 SIDE, FRAMES = 160, 8
 """Pixels along the longer side, and number, of the frames that a color is continued from: a color has no detail."""
 
-BELIEF = 0.08
+COLOR_SPREAD = 0.08
 """Standard deviation, in sRGB values, of what a given color stands for: a clear sky is off its mean by .2 at most. With
 .12 leaves below a sky are taken for it (docs/experiments/background.md)."""
 
@@ -122,7 +122,7 @@ def continued_color(color: Picture, clip: Clip) -> Picture | None:
     away = np.sqrt(channel_mean(np.square(beside)))
     if np.count_nonzero(away < ALIKE) < MIN_BESIDE * away.size:
         return None
-    weight = np.where(away < FARTHEST, np.exp(-0.5 * np.square(away / np.float32(BELIEF))), np.float32(0))
+    weight = np.where(away < FARTHEST, np.exp(-0.5 * np.square(away / np.float32(COLOR_SPREAD))), np.float32(0))
     total = weight + np.float32(COLOR_WEIGHT)
     change = push_pull(np.nan_to_num(beside) * (weight / total)[..., None], np.minimum(total, 1))
     return srgb_to_linear(np.maximum(given + area_average(change, *clip.size), 0))

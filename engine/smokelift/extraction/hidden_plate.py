@@ -140,26 +140,31 @@ class HiddenPlate:
 class SomeFrames:
     """Some frames of a clip and its plate, of some pixels to a cell.
 
-    ``away`` (frames,) are their seconds after the part of the clip in use, negative before it; ``cells`` are the
+    ``seconds_after`` (frames,) are from the part of the clip in use, negative before it, 0 in it; ``cells`` are the
     numbers of columns and rows of cells.
     """
 
     clip: Clip
     numbers: Sequence[int]
-    away: NDArray[np.float64]
+    seconds_after: NDArray[np.float64]
     pictures: Sequence[Picture]
     plate: Plate
     cells: tuple[int, int]
 
     @staticmethod
     def of(
-        clip: Clip, plate: Plate, numbers: Sequence[int], away: NDArray[np.float64], side: int, detail_of: int = 0
+        clip: Clip,
+        plate: Plate,
+        numbers: Sequence[int],
+        seconds_after: NDArray[np.float64],
+        side: int,
+        detail_of: int = 0,
     ) -> "SomeFrames":
         """Read frames at their plate's exposure, for so many cells along the longer ``side``; see `compared_size`."""
         cells = reduced_size(*clip.size, side)
         size = compared_size(cells, clip.size, plate.finest, detail_of)
         pictures = [clip.stored(frame).averaged(*size) for frame in numbers]
-        return SomeFrames(clip, numbers, away, pictures, resized(plate, size), cells)
+        return SomeFrames(clip, numbers, seconds_after, pictures, resized(plate, size), cells)
 
     @property
     def independent(self) -> float:
@@ -192,9 +197,9 @@ def in_turn(frames: SomeFrames, start: HiddenPlate) -> HiddenPlate:
     for _ in range(TURNS):
         found = replace(plate, image=_changed(plate, turned.image - behind))
         best, clearest = np.zeros_like(start.left), start.image
-        for cells, away in zip(frames.against(found), frames.away, strict=True):
+        for cells, seconds in zip(frames.against(found), frames.seconds_after, strict=True):
             shown, weight = _shown(cells, start.source)
-            weight *= np.exp(-CHANGES * abs(away))
+            weight *= np.exp(-CHANGES * abs(seconds))
             # errors of smoke are much the same in all frames, so a mean of frames is no better than the best of them
             best, clearest = np.maximum(best, weight), np.where(weight > best, shown, clearest)
         left = 1 / (1 + variance * best)
@@ -246,8 +251,8 @@ def likeliest_plate(frames: SomeFrames, source: Picture) -> HiddenPlate:
     away = [values - source for values, _ in seen]
     spread = np.square(BRIGHTNESS_RANGE)
     # another plate has any color, and explains no frame better than this one could
-    another = np.log(np.maximum(high - low, EIGHT_BIT_STEP)).sum()
-    another = np.maximum(another - 1.5 * np.log(2 * np.pi * np.mean([noise for _, noise in seen], axis=0)), 0)
+    any_color = np.log(np.maximum(high - low, EIGHT_BIT_STEP)).sum()
+    loss_of_another = np.maximum(any_color - 1.5 * np.log(2 * np.pi * np.mean([noise for _, noise in seen], axis=0)), 0)
     losses = np.zeros((len(seen), len(nearby)))
     for index, (color, smooth, number, clear) in enumerate(hypotheses):
         loss = _prior_loss(smooth, expected, plate.errors, high - low)
@@ -268,7 +273,7 @@ def likeliest_plate(frames: SomeFrames, source: Picture) -> HiddenPlate:
                 detail += left**2 * products[number][number]
                 squares = np.minimum(squares, misfit + 3 * DETAIL_WEIGHT * detail)
             losses[frame] = 0.5 * (OUTLIER_FREEDOM + 3) * np.log1p(squares / noise / OUTLIER_FREEDOM)
-        loss += _over_time(frames.independent * losses, frames.away, another)
+        loss += _over_time(frames.independent * losses, frames.seconds_after, loss_of_another)
         loss = around(loss)
         best, least = np.where(loss < least, index, best), np.minimum(loss, least)
     image, factors = start.copy(), np.zeros((len(pictures), *where.shape), np.float32)
@@ -282,17 +287,17 @@ def likeliest_plate(frames: SomeFrames, source: Picture) -> HiddenPlate:
 
 
 def _over_time(
-    losses: NDArray[np.float64], away: NDArray[np.float64], another: NDArray[np.float64]
+    losses: NDArray[np.float64], seconds_after: NDArray[np.float64], loss_of_another: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """The loss (n,) of a plate by its ``losses`` (frames, n) in frames so many seconds ``away`` from the clip in use.
+    """The loss (n,) of a plate by its ``losses`` (frames, n) in frames so many seconds after the clip in use.
 
-    Before and after the clip it may have changed once: frames beyond tell nothing of it, at the loss of ``another``.
+    Before and after the clip it may have changed once: frames beyond tell nothing of it, at the loss of another plate.
     """
-    total: NDArray[np.float64] = losses[away == 0].sum(0)
-    for side in (np.flatnonzero(away < 0), np.flatnonzero(away > 0)[::-1]):  # the farthest first
+    total: NDArray[np.float64] = losses[seconds_after == 0].sum(0)
+    for side in (np.flatnonzero(seconds_after < 0), np.flatnonzero(seconds_after > 0)[::-1]):  # the farthest first
         loss = np.zeros_like(total)
-        for frame, seconds in zip(side, -np.diff(np.abs(away[side]), append=0), strict=True):
-            changed = another - np.log(-np.expm1(-CHANGES * seconds))
+        for frame, seconds in zip(side, -np.diff(np.abs(seconds_after[side]), append=0), strict=True):
+            changed = loss_of_another - np.log(-np.expm1(-CHANGES * seconds))
             loss = np.minimum(loss + losses[frame] + CHANGES * seconds, changed)
         total += loss
     return total
