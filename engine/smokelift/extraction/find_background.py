@@ -23,10 +23,16 @@ import numpy as np
 from smokelift.checks import Mask
 from smokelift.extraction.camera_motion import CameraMotion, Texture, find_motion, motion_before
 from smokelift.extraction.clear_picture import ClearPicture, clear_picture, spread_out, whole_plate
-from smokelift.extraction.given_background import continued_color, mean_of_frames, read_background
+from smokelift.extraction.given_background import (
+    PAINTED,
+    Strokes,
+    continued_color,
+    mean_of_frames,
+    read_background,
+    stroked,
+)
 from smokelift.extraction.plate import Plate, cleared, finest_detail, known_plate, uncovered, without_noise_light
 from smokelift.extraction.proxy import PROXY_SIDE, Proxy
-from smokelift.extraction.strokes import PAINTED, Strokes, stroked
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import (
     Picture,

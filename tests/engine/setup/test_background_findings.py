@@ -9,8 +9,8 @@ from scipy import ndimage
 from smokelift import Background, Clip
 from smokelift.checks import Finding
 from smokelift.extraction.find_background import FoundBackground, find_background
+from smokelift.extraction.given_background import Strokes
 from smokelift.extraction.matte import matte
-from smokelift.extraction.strokes import Strokes
 from smokelift.footage.images import blurred
 from smokelift.output.images import write_image
 from smokelift.setup.background_findings import background_findings, doubts, first_findings
