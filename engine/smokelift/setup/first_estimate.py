@@ -8,10 +8,9 @@ from numpy.typing import NDArray
 
 from smokelift.extraction.element import shows_transmittance
 from smokelift.extraction.find_background import FoundBackground, find_background
-from smokelift.extraction.fire import HotPixels, fire_color, firelight, hot_pixels, without_fire
 from smokelift.extraction.given_background import single_color
 from smokelift.extraction.hidden_plate import plate_and_source
-from smokelift.extraction.matte import matte
+from smokelift.extraction.matte import HotPixels, fire_color, firelight, hot_pixels, matte, without_fire
 from smokelift.extraction.plate import Plate, cleared
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import Picture, area_average, reduced_size

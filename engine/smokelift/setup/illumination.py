@@ -13,7 +13,7 @@ import numpy as np
 
 from smokelift.checks import UNDETERMINED, Figures, Finding
 from smokelift.extraction.element import SOURCE_SIDE, extract_element
-from smokelift.extraction.fire import MIN_COLORED_VALUE
+from smokelift.extraction.matte import MIN_COLORED_VALUE
 from smokelift.footage.images import Picture, channel_mean, reduced_size
 from smokelift.footage.noise import Noise
 from smokelift.render.image import environment_count

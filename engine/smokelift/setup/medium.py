@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from smokelift.checks import UNDETERMINED, Doubles, Finding
-from smokelift.extraction.fire import CLIPPED_VALUE, MIN_COLORED_VALUE
+from smokelift.extraction.matte import CLIPPED_VALUE, MIN_COLORED_VALUE
 from smokelift.footage.images import brightest_channel
 from smokelift.render import scene_optics
 from smokelift.scene import Background, Camera, CompleteScene, Domain, EnvironmentLight, Light, Medium, Scene
