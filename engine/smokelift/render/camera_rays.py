@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from smokelift.checks import Array, Doubles
 from smokelift.scene import Camera, Domain
+from smokelift.scene.camera import world_to_pixel
 from smokelift.scene.domain import LATERAL
-from smokelift.scene.projection import world_to_pixel
 
 INSIDE = 1e-3
 """The footprint is open, so places are kept so many voxels inside: floats then round to the same cell everywhere."""

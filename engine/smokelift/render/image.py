@@ -26,7 +26,7 @@ from smokelift.scene import (
     completed,
     require_scene,
 )
-from smokelift.scene.projection import voxel_width
+from smokelift.scene.camera import voxel_width
 
 LARGEST_DEPTH = 1e20
 """Optical depth of a voxel, at most: that of a ray through thousands of them is still a number of 32 bits."""

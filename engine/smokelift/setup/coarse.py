@@ -20,7 +20,7 @@ from smokelift.extraction.plate import Plate
 from smokelift.footage.images import area_average
 from smokelift.render import Image, Optics, scene_optics
 from smokelift.scene import Camera, CompleteScene, Domain, Scattering
-from smokelift.scene.projection import voxel_width
+from smokelift.scene.camera import voxel_width
 from smokelift.setup.resolution import proportional
 from smokelift.setup.shot import ShotView
 from smokelift.setup.working_picture import CameraError, working_picture

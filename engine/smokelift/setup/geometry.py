@@ -12,7 +12,7 @@ from smokelift.checks import Doubles, Figures, Finding
 from smokelift.density.upright_plane import view_frame
 from smokelift.footage.clip import Clip
 from smokelift.scene import Camera, Domain, Scene, as_matrix
-from smokelift.scene.projection import voxel_width
+from smokelift.scene.camera import voxel_width
 from smokelift.setup.first_estimate import FirstEstimate, SmokeSamples
 from smokelift.setup.resolution import DetailSpectrum, Grid, Shape, choose_grid, proportional, smoke_detail
 from smokelift.setup.settings import LIMITS, QUALITIES, Quality, Settings

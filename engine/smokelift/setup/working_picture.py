@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import Picture, area_average
 from smokelift.scene import Camera, Domain
-from smokelift.scene.projection import project_points, voxel_width
+from smokelift.scene.camera import project_points, voxel_width
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import pytest
 from scene_examples import FRONT, moving_camera
 
 from smokelift.scene import Camera, Domain, SceneError, orbit
-from smokelift.scene.projection import project_points
+from smokelift.scene.camera import project_points
 
 DOMAIN = Domain((-0.6, -0.6, 0), (0.6, 0.6, 1.6), (24, 24, 32))
 CENTER = np.array([0, 0, 0.8])

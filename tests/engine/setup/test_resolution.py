@@ -10,7 +10,7 @@ from scipy import ndimage
 from smokelift.checks import Finding
 from smokelift.footage.images import linear_to_srgb, srgb_to_linear
 from smokelift.scene import Box, Camera, ClipSource, Domain, Scene
-from smokelift.scene.projection import voxel_width
+from smokelift.scene.camera import voxel_width
 from smokelift.setup.resolution import RINGS, DetailSpectrum, smoke_detail
 from smokelift.setup.settings import LIMITS, Settings
 from tests.engine.films import clear_plate, clip_of

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from smokelift.scene import Camera, Domain
-from smokelift.scene.projection import project_points
+from smokelift.scene.camera import project_points
 from smokelift.setup.working_picture import CameraError, working_picture
 
 DOMAIN = Domain((-0.6, -0.6, 0), (0.6, 0.6, 1.6), (24, 24, 32))
