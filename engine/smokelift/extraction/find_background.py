@@ -35,15 +35,16 @@ from smokelift.extraction.plate import Plate, cleared, finest_detail, known_plat
 from smokelift.extraction.proxy import PROXY_SIDE, Proxy
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import (
+    DETAIL,
     Picture,
     area_average,
     blurred,
     channel_mean,
+    continuation_errors,
     linear_to_srgb,
     reduced_size,
     srgb_to_linear,
 )
-from smokelift.footage.inpainting import DETAIL, continuation_errors
 from smokelift.footage.noise import (
     EIGHT_BIT_STEP,
     Noise,

@@ -18,19 +18,18 @@ from scipy import ndimage
 from smokelift.checks import Mask
 from smokelift.extraction.plate import Plate, shown_behind
 from smokelift.footage.clip import Clip
-from smokelift.footage.frame_source import ClipError
-from smokelift.footage.image_sequence import is_pattern, is_video
+from smokelift.footage.frame_source import ClipError, is_pattern, is_video
+from smokelift.footage.image_files import read_image, read_layer
 from smokelift.footage.images import (
     Picture,
     area_average,
     channel_mean,
+    continuation_errors,
     linear_to_srgb,
-    read_image,
-    read_layer,
+    push_pull,
     reduced_size,
     srgb_to_linear,
 )
-from smokelift.footage.inpainting import continuation_errors, push_pull
 from smokelift.footage.mask import require_shape
 from smokelift.footage.noise import median_of_seen
 from smokelift.scene import Background, Camera, Scene, shared_part

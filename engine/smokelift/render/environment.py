@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.checks import Doubles, Indices
-from smokelift.footage.images import LUMINANCE, ImageError, read_image
+from smokelift.footage.image_files import ImageError, read_image
+from smokelift.footage.images import LUMINANCE
 from smokelift.scene import DirectionalLight, EnvironmentLight
 
 CELLS = (256, 512)

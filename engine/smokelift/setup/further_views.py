@@ -16,7 +16,7 @@ from smokelift.density import ViewSet
 from smokelift.density.hull import agreement
 from smokelift.extraction.find_background import find_background
 from smokelift.footage.clip import Clip
-from smokelift.footage.image_sequence import is_video
+from smokelift.footage.frame_source import is_video
 from smokelift.scene import ClipSource, CompleteScene
 from smokelift.setup.background_findings import background_findings
 from smokelift.setup.coarse import SCATTERING_TOLERANCE, HeldOut, coarse_frames, held_out

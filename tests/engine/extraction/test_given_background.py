@@ -13,7 +13,8 @@ from smokelift.extraction.matte import matte
 from smokelift.extraction.plate import Plate, known_plate
 from smokelift.footage.clip import Clip
 from smokelift.footage.frame_source import ClipError
-from smokelift.footage.images import ImageError, srgb_to_linear
+from smokelift.footage.image_files import ImageError
+from smokelift.footage.images import srgb_to_linear
 from smokelift.output.images import write_image
 from smokelift.scene import Background, Camera, ClipSource, Scene, look_at_matrix
 from tests.engine.films import (

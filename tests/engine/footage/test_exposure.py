@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from smokelift.footage.exposure import gain_of, sample_gains, shows_exposure
+from smokelift.footage.noise import gain_of, sample_gains, shows_exposure
 from tests.engine.films import HEIGHT, WIDTH, puff, wall
 
 GAINS = np.array([1.3, 1.0, 0.8], np.float32)

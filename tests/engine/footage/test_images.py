@@ -8,19 +8,15 @@ from hypothesis import strategies as st
 from PIL import Image
 from scipy import ndimage
 
-from smokelift.footage.images import (
+from smokelift.footage.image_files import (
     ImageError,
     PictureKindError,
-    area_average,
-    blurred,
-    brightest_channel,
     linear_layer,
-    linear_to_srgb,
     read_image,
     read_layer,
     read_stored,
-    srgb_to_linear,
 )
+from smokelift.footage.images import area_average, blurred, brightest_channel, linear_to_srgb, srgb_to_linear
 from smokelift.output.images import write_image
 from tests.engine.films import encode, write_exr
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from smokelift.footage.inpainting import continuation_errors, in_one_piece, mostly_beside, push_pull
+from smokelift.footage.images import continuation_errors, in_one_piece, mostly_beside, push_pull
 
 HEIGHT, WIDTH = 40, 60
 COLOR = np.array([0.3, 0.2, 0.1], np.float32)

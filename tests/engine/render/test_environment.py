@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from smokelift.footage.images import ImageError
+from smokelift.footage.image_files import ImageError
 from smokelift.render.environment import EnvironmentCells
 from smokelift.scene import EnvironmentLight
 from tests.engine.render.environments import sky, soft_lamps, texels
