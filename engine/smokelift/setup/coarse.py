@@ -21,9 +21,8 @@ from smokelift.footage.images import area_average
 from smokelift.render import Image, Optics, scene_optics
 from smokelift.scene import Camera, CompleteScene, Domain, Scattering
 from smokelift.scene.camera import voxel_width
-from smokelift.setup.resolution import proportional
+from smokelift.setup.geometry import CameraError, proportional, working_picture
 from smokelift.setup.shot import ShotView
-from smokelift.setup.working_picture import CameraError, working_picture
 
 COARSE_SIDE = 32
 """Largest number of voxels along the longest side: a few per cent of the work of 96, and every large shadow is there

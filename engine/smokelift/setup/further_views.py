@@ -18,13 +18,11 @@ from smokelift.extraction.find_background import find_background
 from smokelift.footage.clip import Clip
 from smokelift.footage.frame_source import is_video
 from smokelift.scene import ClipSource, CompleteScene
-from smokelift.setup.background_findings import background_findings
 from smokelift.setup.coarse import SCATTERING_TOLERANCE, HeldOut, coarse_frames, held_out
-from smokelift.setup.first_estimate import sample_smoke, with_source
-from smokelift.setup.geometry import fitting
+from smokelift.setup.first_estimate import background_findings, sample_smoke, with_source
+from smokelift.setup.geometry import CameraError, fitting
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot, ShotView
-from smokelift.setup.working_picture import CameraError
 
 AGREEMENT_SAMPLES = 4
 """Frames in which the views are compared: a wrong one does not decide their median."""

@@ -12,9 +12,8 @@ from smokelift.extraction.plate import Plate, uncovered
 from smokelift.footage.clip import Clip
 from smokelift.render import Image, Optics
 from smokelift.scene import Camera, CompleteScene, Domain, Inlet
-from smokelift.setup.resolution import Grid
+from smokelift.setup.geometry import CameraError, Grid, WorkingPicture, working_picture
 from smokelift.setup.settings import Quality, Settings
-from smokelift.setup.working_picture import CameraError, WorkingPicture, working_picture
 
 
 @dataclass(frozen=True, eq=False)
