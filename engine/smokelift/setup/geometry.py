@@ -9,7 +9,6 @@ pixel per voxel.
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -270,9 +269,9 @@ def _smoke_detail(estimate: FirstEstimate, camera: Camera, box: Domain) -> Detai
     """The smoke's detail in the frames with the most of it, at the clip's own pixels; None without smoke."""
     smoky, frames = estimate.samples.smoky, []
     for number in smoky[:DETAIL_FRAMES]:
-        with suppress(CameraError):
-            part = working_picture(camera.at(number), box).part
-            frames.append((part(estimate.clip.frame(number)), estimate.plate.at(number).through(part)))
+        if (working := working_picture(camera.at(number), box)) is not None:
+            picture = working.part(estimate.clip.frame(number))
+            frames.append((picture, estimate.plate.at(number).through(working.part)))
     return smoke_detail(frames, _pixels_along(camera.at(smoky[0]), box)) if smoky else None
 
 
@@ -389,16 +388,11 @@ class WorkingPicture:
         return clip.stored(number).cut(self.part).averaged(*self.camera.size)
 
 
-class CameraError(ValueError):
-    """A camera that does not see the domain."""
-
-
-def working_picture(camera: Camera, domain: Domain) -> WorkingPicture:
-    """Return the picture that a grid is fitted to.
+def working_picture(camera: Camera, domain: Domain) -> WorkingPicture | None:
+    """Return the picture that a grid is fitted to; None if the camera sees no part of the domain.
 
     A pixel is as wide as a voxel at the domain's center, unless the footage is coarser: finer pixels hold detail that
-    the grid cannot show, coarser ones lose detail that it can. CameraError is raised if the picture shows no part of
-    the domain.
+    the grid cannot show, coarser ones lose detail that it can.
     """
     pixels, depth = project_points(camera, domain.corners())
     width, height = camera.size
@@ -406,7 +400,7 @@ def working_picture(camera: Camera, domain: Domain) -> WorkingPicture:
     if (depth > 0).all():
         low, high = np.maximum(pixels.min(0), low), np.minimum(pixels.max(0), high)
     if (depth <= 0).all() or (high - low < 1).any():
-        raise CameraError("The camera does not see the domain; move the domain into the picture or turn the camera.")
+        return None
     left, top = (int(v) for v in np.floor(low))
     right, bottom = (int(v) for v in np.ceil(high))
     shrink = max(1.0, voxel_width(camera, domain))

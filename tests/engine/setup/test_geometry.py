@@ -11,9 +11,11 @@ from smokelift.checks import Finding
 from smokelift.footage.images import linear_to_srgb, srgb_to_linear
 from smokelift.scene import Box, Camera, ClipSource, Domain, Scene
 from smokelift.scene.camera import project_points, voxel_width
-from smokelift.setup.geometry import RINGS, CameraError, DetailSpectrum, smoke_detail, working_picture
+from smokelift.setup.geometry import RINGS, DetailSpectrum, smoke_detail, working_picture
 from smokelift.setup.settings import LIMITS, Settings
+from smokelift.setup.shot import ShotView
 from tests.engine.films import clear_plate, clip_of
+from tests.engine.scene.scene_examples import CENTER, DOMAIN, ORTHOGRAPHIC, PERSPECTIVE, TILTED
 from tests.engine.setup.shots import geometry_of
 
 SIZE = (192, 256)
@@ -133,11 +135,6 @@ def test_a_grid_loses_what_is_finer_than_two_of_its_voxels() -> None:
     assert DetailSpectrum(np.zeros(RINGS), 64).lost(32) == 0
 
 
-DOMAIN = Domain((-0.6, -0.6, 0), (0.6, 0.6, 1.6), (24, 24, 32))
-CENTER = np.array([0, 0, 0.8])
-PERSPECTIVE = Camera.look_at((0, -4, 0.8), (0, 0, 0.8), fov_y_degrees=30, size=(160, 224))
-ORTHOGRAPHIC = Camera("orthographic", PERSPECTIVE.matrix, (160, 224), 103.0, 103.0, 80.0, 112.0)
-TILTED = Camera.look_at((1, -4, 2.0), (0, 0, 0.8), fov_y_degrees=30, size=(160, 224))
 both = pytest.mark.parametrize("camera", [PERSPECTIVE, ORTHOGRAPHIC])
 
 
@@ -189,5 +186,6 @@ def test_coarse_footage_is_not_enlarged(camera) -> None:
 @both
 def test_a_domain_outside_the_view_is_refused(camera) -> None:
     beside = Domain((9.4, -0.6, 0), (10.6, 0.6, 1.6), (24, 24, 32))
-    with pytest.raises(CameraError, match="domain"):
-        working_picture(camera, beside)
+    assert working_picture(camera, beside) is None
+    with pytest.raises(ValueError, match="does not see the domain"):
+        ShotView.facing(beside, None, camera, None, None)
