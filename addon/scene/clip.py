@@ -5,8 +5,7 @@ from typing import Any
 import bpy
 
 from ..core import ShotError
-from ..core.contract import PANORAMA_SUFFIXES
-from ..core.image_sequence import ImageSequence, image_sequence_from
+from ..core.contract import PANORAMA_SUFFIXES, ImageSequence, image_sequence_from
 from .blender import file_of, frame_rate
 from .smoke import scene_of
 

@@ -8,8 +8,7 @@ from pathlib import Path
 import bpy
 from mathutils import Vector
 
-from ..core.contract import DIRECTIONS, FRAME_FILE, MADE_UP, PROXY_FILE
-from ..core.retiming import retiming
+from ..core.contract import DIRECTIONS, FRAME_FILE, MADE_UP, PROXY_FILE, retiming
 from ..core.take import TITLES, Snapshot, Take
 from .blender import absolute, file_of, frame_rate, relative, set_unless_changed
 from .box import engine_to_world
@@ -243,13 +242,13 @@ def _set_time(smoke: bpy.types.Object, now: Snapshot) -> None:
     live = settings.directing.live and _direction(now) != "retime" and not _tracked(now)
     steps = ratio if real else 1.0
     speeds = settings.directing.speeds() if live else (1.0,)
-    timing = retiming(len(numbers), speeds)
     before = frames_before(smoke, shown_take(smoke))
     first = (settings.clip.frame_start if settings.clip else 1) + (round(before * ratio) if real else before)
     set_unless_changed(smoke.data, "start", smoke.data, "frame_start", first)
     start = smoke.data.frame_start
     time = f"(frame-{start}+{EARLY})/{steps:.9g}"
-    place = f"min({timing.place(time)},{len(numbers) - 1})"
+    timing = retiming(len(numbers), speeds, time)
+    place = f"min({timing.place},{len(numbers) - 1})"
     fit_interpolation(smoke, settings.between and (real or live))
     for volume, _, ahead in _volumes(smoke):
         volume.frame_start, volume.frame_offset = start, numbers[0] - 1
@@ -263,7 +262,7 @@ def _set_time(smoke: bpy.types.Object, now: Snapshot) -> None:
             file = f"min(floor({place})+{ahead},{len(numbers) - 1})" if ahead else f"floor({place})"
             volume.driver_add("frame_offset").driver.expression = f"{file}-(frame-{start})+{numbers[0] - 1}"
         if live and len(speeds) > 1:
-            scale = f"{1.0 if real else ratio:.9g}*({timing.speed(time)})"
+            scale = f"{1.0 if real else ratio:.9g}*({timing.speed})"
             volume.driver_add("velocity_scale").driver.expression = scale
     drive_interpolation(smoke, place, 1.0 / now.scene["clip"]["fps"])
 
