@@ -45,6 +45,24 @@ def empty_material(name: str) -> bpy.types.Material:
     return material
 
 
+def compositor(scene: bpy.types.Scene) -> tuple[Tree, Socket]:
+    """The scene's compositor, made if there is none, and the socket of its output."""
+    if SINCE_5:
+        tree = scene.compositing_node_group
+        if tree is None:
+            tree = scene.compositing_node_group = bpy.data.node_groups.new("Compositing", "CompositorNodeTree")
+        if not any(item.item_type == "SOCKET" and item.in_out == "OUTPUT" for item in tree.interface.items_tree):
+            tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
+        kind, identifier = "GROUP_OUTPUT", "NodeGroupOutput"
+    else:
+        scene.use_nodes = True
+        tree = scene.node_tree
+        kind, identifier = "COMPOSITE", "CompositorNodeComposite"
+    scene.render.use_compositing = True
+    output = next((node for node in tree.nodes if node.type == kind), None) or tree.nodes.new(identifier)
+    return tree, output.inputs[0]
+
+
 def file_group(
     name: str, kind: str, mark: str, inputs: Sequence[Input], outputs: Mapping[str, str], build: Callable[[Tree], None]
 ) -> Tree:

@@ -18,7 +18,7 @@ from .box import box_corners, box_of, domain_table, has_inlet, in_scene, inlet_t
 from .camera import camera_over_frames
 from .clip import clip_table, start_frame
 from .lights import light_tables
-from .mask import mask_path
+from .pictures import mask_path
 from .plate import background_table
 from .smoke import scene_of
 
