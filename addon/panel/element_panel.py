@@ -13,11 +13,11 @@ from ..core import ShotError
 from ..core.take import Take
 from ..result import smoke_takes
 from ..result.side_job import write_files
+from ..scene.background import lay_below, saved_strokes, strokes_at
 from ..scene.clip import number_in_file, shown_frame
 from ..scene.pictures import write_pictures
 from ..scene.scene_file import footage_tables
 from ..scene.smoke import active_smoke
-from ..scene.strokes import lay_below, saved_strokes, strokes_at
 from .common import FOLDER, UNDO, OpensBrowser, needs_clip, needs_rest, operator, panels
 from .editors import show_image
 from .layout import draw_text, draw_work

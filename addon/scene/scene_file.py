@@ -13,13 +13,13 @@ from mathutils import Matrix
 
 from ..core import ShotError
 from ..core.contract import IMAGE_SUFFIXES, SIDES
+from .background import background_table
 from .blender import absolute, at_frame, file_of
 from .box import box_corners, box_of, domain_table, has_inlet, in_scene, inlet_table, keep_camera_outside
 from .camera import camera_over_frames
 from .clip import clip_table, start_frame
 from .lights import light_tables
 from .pictures import mask_path
-from .plate import background_table
 from .smoke import scene_of
 
 

@@ -16,8 +16,7 @@ from .blender import set_and_remember, set_unless_changed
 from .clip import used_range
 from .compositing import composite, disable_composite
 from .nodes import add_node
-from .plate import show_clip_behind, show_plate, show_plate_behind
-from .projection import project, show_card
+from .plate import project, show_card, show_clip_behind, show_plate, show_plate_behind
 from .smoke import ASSUMED_CAMERA, hide_default_lamp, scene_of, smokes
 
 NAME = "Smokelift"

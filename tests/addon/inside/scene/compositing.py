@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 import pytest
 
-from addon.scene import compositing, projection, volume
+from addon.scene import compositing, plate, volume
 from conftest import changed, made, pixels, rendered, ticked
 from smokelift.footage.images import srgb_to_linear
 from smokelift.output.images import write_image
@@ -162,7 +162,7 @@ def traces(scene: bpy.types.Scene) -> dict[str, object]:
         "held out": any(each.holdout for each in scene.view_layers[0].layer_collection.children),
         "objects": {
             name
-            for name in (compositing.FLOOR, projection.CARD)
+            for name in (compositing.FLOOR, plate.CARD)
             if name in scene.objects and not scene.objects[name].hide_render
         },
     }
@@ -196,7 +196,7 @@ def test_a_place_of_the_plate_undoes_the_one_before(plates, tmp_path, after) -> 
         found[before] = traces(scene)
         scene.render.engine = "CYCLES"
         pictures[before] = rendered(scene, tmp_path / "found.exr")
-    own = {"COMPOSITE": {compositing.FLOOR}, "PROJECTION": {projection.CARD}}
+    own = {"COMPOSITE": {compositing.FLOOR}, "PROJECTION": {plate.CARD}}
     assert found[None]["objects"] == own.get(after, set())
     for before in PLACES:
         assert found[before] == found[None], before

@@ -1,11 +1,12 @@
-"""Strokes over a frame of the clip: where smoke is, where none is, and where the background is seen.
+"""What is behind the smoke in a scene file: a clean plate, frames or a color that is given, and strokes on the clip.
 
-Blender shows no picture below one that is painted. So the frame is in the image itself, in pale colors: what has a
-strong color is a stroke. The file has the strokes alone, with alpha. It is written whenever the engine is about to read
-it.
+Strokes say where smoke is, where none is, and where the background is seen. Blender shows no picture below one that is
+painted, so the frame is in the image itself, in pale colors: what has a strong color is a stroke. The file has the
+strokes alone, with alpha. It is written whenever the engine is about to read it.
 """
 
 from pathlib import Path
+from typing import Any
 
 import bpy
 import numpy as np
@@ -13,11 +14,44 @@ import numpy.typing as npt
 
 from ..core import ShotError
 from .blender import absolute, file_of, relative
+from .clip import frame_count, number_in_file
 
 SATURATION = 0.25  # fraction of the frame's saturation that is kept below the strokes
 MIN_STROKE = 0.5  # smallest alpha of a stroke, and smallest difference of its channels: twice that of the frame below
 WRITTEN = "smokelift_written"  # custom property of an image with a frame below: its file's time when written
 Pixels = npt.NDArray[np.float32]  # red, green, blue and alpha of an image, (pixels, 4)
+
+
+def background_table(smoke: bpy.types.Object) -> dict[str, Any]:
+    """The table; empty where the engine estimates the background. ShotError if a picture or a frame is missing."""
+    settings, table = smoke.smokelift, {}
+    if settings.plate_mode == "FILE":
+        if not settings.plate:
+            raise ShotError("Choose the clean plate, or choose From the Clip.")
+        file = absolute(settings.plate)
+        if not file.is_file():
+            raise ShotError(f"The clean plate {file} is not there: choose it again.")
+        table["image"] = str(file)
+    elif settings.plate_mode == "FRAMES":
+        table["frame"] = [number_in_file(settings.clip, number) for number in _clean_frames(settings)]
+    elif settings.plate_mode == "COLOR":
+        table["color"] = list(settings.plate_color)
+    if settings.strokes is not None:
+        table["strokes"] = str(saved_strokes(settings.strokes, settings.clip))
+    return table
+
+
+def _clean_frames(settings: bpy.types.PropertyGroup) -> list[int]:
+    """The chosen frames, counted from 1 as in the panel."""
+    words = settings.plate_frames.replace(",", " ").split()
+    if not words:
+        raise ShotError("Go to a frame without smoke and press Plate from This Frame, or choose another Background.")
+    count = frame_count(settings.clip)
+    if not all(word.isdecimal() and 1 <= int(word) <= count for word in words):
+        raise ShotError(
+            f"Frames {settings.plate_frames} are not in the clip: it has frames 1 to {count}, separated by commas."
+        )
+    return sorted({int(word) for word in words})
 
 
 def saved_strokes(image: bpy.types.Image, clip: bpy.types.MovieClip) -> Path:
