@@ -6,7 +6,7 @@ from bpy_extras import view3d_utils
 
 from ..core import ShotError
 from ..scene.box import box_of, framed_box, has_inlet, new_box
-from ..scene.floor import Floor
+from ..scene.camera import Floor
 from ..scene.plate import show_clip_behind
 from ..scene.smoke import active_smoke, scene_of
 from .clip_panel import draw_mask, draw_picture

@@ -14,8 +14,7 @@ from addon.core.job import Job
 from addon.core.take import Take, takes
 from addon.result import shot_check, side_job, smoke_takes
 from addon.scene import look, volume
-from addon.scene.lights import emitted
-from addon.scene.scene_file import shot_tables
+from addon.scene.scene_file import emitted, shot_tables
 from addon.scene.smoke import activate
 from conftest import rendered, save_image
 from smokelift.evaluation.metrics import psnr
