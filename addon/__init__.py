@@ -8,11 +8,11 @@ from importlib import import_module
 from types import ModuleType
 
 MODULES = (
-    ("panel", "preferences properties"),
+    ("panel", "properties"),
     ("scene", "volume"),
     ("result", "follow shot_check run_queue side_job export command_line"),
-    ("panel", "clip_panel camera_panel quality_panel run_panel editors tab"),
-    ("panel", "element_panel results_panel advanced_panel look_panel setup_panel direct_panel export_panel"),
+    ("panel", "clip_panel camera_panel quality_panel editors tab"),
+    ("panel", "element_panel results_panel look_panel direct_panel export_panel"),
 )
 """Folders and modules with classes or more to register, each after those it needs; panels in the order of the tab."""
 

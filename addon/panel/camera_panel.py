@@ -10,9 +10,21 @@ from ..scene.camera import Floor
 from ..scene.plate import show_clip_behind
 from ..scene.smoke import active_smoke, scene_of
 from .clip_panel import draw_mask, draw_picture
-from .common import UNDO, Need, Needing, needs_clip, needs_smoke, operator
+from .common import (
+    UNDO,
+    Need,
+    Needing,
+    automatic_unless,
+    choice,
+    closed_sides,
+    link,
+    needs_clip,
+    needs_smoke,
+    number,
+    operator,
+    tick,
+)
 from .layout import draw_automatic, draw_closed
-from .settings import automatic_unless, choice, closed_sides, link, number, tick
 
 USUAL_DISTANCE = 2.0  # meters from which a distance is given by hand where there is no box
 

@@ -1,24 +1,30 @@
-"""What operators, panels and settings share: when they can be used, and how operators say what is in the way."""
+"""How settings, operators and panels are declared, when they can be used, and how operators say what is in the way.
+
+A setting is one of Blender's properties, as ``number(name, limits)(tooltip)``.
+"""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import bpy
-from bpy.props import BoolProperty, StringProperty
+from bpy import props
 
 from ..core import ShotError
+from ..core.contract import SIDES
 from ..result.side_job import writing_job
 from ..scene import volume
 from ..scene.smoke import active_smoke
 
 EDITORS = {"view": "VIEW_3D", "clip": "CLIP_EDITOR"}  # the editors that have the tab in their sidebar
 UNDO = {"REGISTER", "UNDO"}  # options of an operator that can be undone, and adjusted
-FILE = StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})  # what a file browser gives its operator
-FOLDER = StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE"})
-HIDDEN = StringProperty(options={"SKIP_SAVE", "HIDDEN"})  # a text that a button gives its operator
+FILE = props.StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})  # what a file browser gives its operator
+FOLDER = props.StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE"})
+HIDDEN = props.StringProperty(options={"SKIP_SAVE", "HIDDEN"})  # a text that a button gives its operator
 
 Act = Callable[..., str | None]
 """Does something in a context with the active smoke; ShotError if something is in the way. What it returns is said."""
+
+Declared = Callable[..., Any]  # makes a property of its tooltip
 
 
 class Need(NamedTuple):
@@ -86,7 +92,7 @@ def operator(
 class OpensBrowser(Needing):
     """One that asks for a folder, or a file."""
 
-    filter_folder: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
+    filter_folder: props.BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         context.window_manager.fileselect_add(self)
@@ -96,8 +102,8 @@ class OpensBrowser(Needing):
 class ChoosesFile(OpensBrowser):
     """One that asks for a picture or a video."""
 
-    filter_movie: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
-    filter_image: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
+    filter_movie: props.BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
+    filter_image: props.BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
 
 
 Draw = Callable[[bpy.types.UILayout, bpy.types.Context, bpy.types.Object], None]  # draws the tab or a part of it
@@ -133,3 +139,42 @@ def panels(name: str, label: str, *needs: Need, **attributes: Any) -> Callable[[
 def speed_changed(_settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
     """Play at the new speed."""
     volume.synchronize_playback()
+
+
+def _named(kind: Callable[..., Any]) -> Callable[..., Declared]:
+    return lambda name, **options: lambda description: kind(name=name, description=description, **options)
+
+
+tick, number, whole, string, vector = map(
+    _named,
+    (props.BoolProperty, props.FloatProperty, props.IntProperty, props.StringProperty, props.FloatVectorProperty),
+)
+"""Something that is on or off, a number, a whole number, a text, and several numbers such as a color."""
+
+
+def choice(name: str, **options: Any) -> Declared:
+    """One of some items, which follow the tooltip; by default the first."""
+    return lambda tip, *items: props.EnumProperty(name=name, description=tip, items=items, **options)
+
+
+def link(name: str, kind: type, **options: Any) -> Declared:
+    """A data-block of a kind."""
+    return _named(props.PointerProperty)(name, type=kind, **options)
+
+
+def automatic_unless(name: str, label: str, start: float | Callable[[Any], float]) -> Any:
+    """A tick for a number that is chosen automatically where it is 0; ticked, the number begins with ``start``.
+
+    It keeps nothing of its own, so it cannot contradict the number.
+    """
+    return tick(
+        label,
+        get=lambda settings: getattr(settings, name) > 0,
+        set=lambda settings, on: setattr(settings, name, (start(settings) if callable(start) else start) if on else 0),
+    )(f"Choose {label} by hand; otherwise it is automatic")
+
+
+def closed_sides(description: str) -> Any:
+    """A row of buttons, one for each side of the box."""
+    items = [(side, f"{side[1]}{side[0].upper()}", "", 1 << place) for place, side in enumerate(SIDES)]
+    return choice("Closed Sides", options={"ANIMATABLE", "ENUM_FLAG"})(description, *items)

@@ -9,9 +9,23 @@ from ..core.contract import FASTEST, SLOWEST
 from ..result import run_queue, smoke_takes
 from ..result.directing import MESHES, frames_of_result
 from ..scene.modifiers import CAN_INTERPOLATE
-from .common import UNDO, Need, needs_clip, needs_result, operator, panels, speed_changed
+from .common import (
+    UNDO,
+    Need,
+    automatic_unless,
+    choice,
+    closed_sides,
+    link,
+    needs_clip,
+    needs_result,
+    number,
+    operator,
+    panels,
+    speed_changed,
+    tick,
+    whole,
+)
 from .layout import draw_automatic, draw_closed, draw_progress, draw_settings, draw_ticked
-from .settings import automatic_unless, choice, closed_sides, link, number, tick, whole
 
 LINES = 11  # of the longest direction: the others are as high, or buttons would move under the pointer
 EFFECTORS = "Effectors"  # name of a collection that the tab makes

@@ -18,10 +18,9 @@ from ..scene.clip import number_in_file, shown_frame
 from ..scene.pictures import write_pictures
 from ..scene.scene_file import footage_tables
 from ..scene.smoke import active_smoke
-from .common import FOLDER, UNDO, OpensBrowser, needs_clip, needs_rest, operator, panels
+from .common import FOLDER, UNDO, OpensBrowser, choice, needs_clip, needs_rest, operator, panels
 from .editors import show_image
 from .layout import draw_text, draw_work
-from .settings import choice
 
 STROKES_FILE = "strokes.png"  # name of the image in the folder of the smoke's results
 COLORS = {"SMOKE": (0.0, 1.0, 0.0), "NOT_SMOKE": (1.0, 0.0, 0.0), "BEHIND": (0.0, 0.0, 1.0)}  # the engine's

@@ -7,9 +7,8 @@ from ..result.side_job import write_files, writing_job
 from ..scene import volume
 from ..scene.blender import PATH_OPTIONS
 from ..scene.smoke import activate
-from .common import UNDO, Need, needs_rest, needs_result, needs_smoke, operator, panels
+from .common import UNDO, Need, choice, needs_rest, needs_result, needs_smoke, operator, panels, string, tick, whole
 from .layout import draw_settings, draw_text, draw_work
-from .settings import choice, string, tick, whole
 
 
 class ExportSettings:
