@@ -12,7 +12,7 @@ MODULES = (
     ("scene", "volume"),
     ("result", "follow shot_check run_queue side_job export command_line"),
     ("panel", "clip_panel camera_panel quality_panel editors tab"),
-    ("panel", "element_panel results_panel look_panel direct_panel export_panel"),
+    ("panel", "element_panel results_panel look_panel direct_panel"),
 )
 """Folders and modules with classes or more to register, each after those it needs; panels in the order of the tab."""
 

@@ -43,28 +43,24 @@ _NAME = re.compile(r"take_(\d{4,})")
 
 @dataclass(frozen=True)
 class Take:
-    """One run's files; ``directory`` holds its sequence."""
+    """One run's files, as above; ``directory`` holds its sequence."""
 
     directory: Path
 
     @property
     def scene_file(self) -> Path:
-        """The scene file."""
         return self.directory.with_suffix(".toml")
 
     @property
     def request_file(self) -> Path:
-        """The engine's further options."""
         return self.directory.with_suffix(".json")
 
     @property
     def log_file(self) -> Path:
-        """The engine's messages."""
         return self.directory.with_suffix(".log")
 
     @property
     def thumbnail_file(self) -> Path:
-        """The thumbnail of the last frame."""
         return self.directory.with_suffix(".png")
 
     def copy_mask(self, drawn: Path) -> str:
@@ -199,7 +195,7 @@ class Snapshot:
     title: str  # the name that the artist gave it, or its number
     index: dict[str, Any]  # `sequence.json`, not to be changed; empty before there is one, or of a foreign one
     numbers: list[int]  # those of the finished frames
-    begun: bool  # whether it has what a run needs
+    resumable: bool  # whether the run can go on: it started and is not complete
     files: frozenset[Path] | None  # .blend files, without links, that may show it; None where a list was never kept
 
     @property
@@ -221,11 +217,6 @@ class Snapshot:
     def complete(self) -> bool:
         """Whether all frames are finished."""
         return bool(self.index.get("complete"))
-
-    @property
-    def resumable(self) -> bool:
-        """Whether the run can go on: it started and is not complete."""
-        return self.begun and not self.complete
 
 
 FileState = tuple[int, int, int] | None  # time, number and size, by which a change is seen; None of a missing file
@@ -253,8 +244,8 @@ def _snapshot_at(take: Take, request_state: FileState, _index_state: FileState, 
     source = Take(Path(os.path.normpath(folder / there))) if isinstance(there, str) else None
     if not isinstance(options, list) or ("direction" in request and (direction is None or source is None)):
         options = None
-    number = take.directory.name.rpartition("_")[2].lstrip("0")
-    files = request.get("files")
+    begun = request_state is not None and (direction is not None or scene_state is not None)
+    number, files = take.directory.name.rpartition("_")[2].lstrip("0"), request.get("files")
     return Snapshot(
         direction=direction,
         source=source,
@@ -262,7 +253,7 @@ def _snapshot_at(take: Take, request_state: FileState, _index_state: FileState, 
         title=str(request.get("title", "")) or f"{TITLES.get(direction or '', 'Take')} {number}",
         index=index,
         numbers=sorted(map(int, index["frames"])) if index else [],
-        begun=request_state is not None and (direction is not None or scene_state is not None),
+        resumable=begun and not index.get("complete"),
         files=frozenset((folder / str(file)).resolve() for file in files) if isinstance(files, list) else None,
     )
 

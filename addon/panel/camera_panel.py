@@ -5,26 +5,13 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from bpy_extras import view3d_utils
 
 from ..core import ShotError
-from ..scene.box import box_of, framed_box, has_inlet, new_box
-from ..scene.camera import Floor
+from ..scene.geometry import Floor, box_of, framed_box, has_inlet, new_box
 from ..scene.plate import show_clip_behind
 from ..scene.smoke import active_smoke, scene_of
 from .clip_panel import draw_mask, draw_picture
-from .common import (
-    UNDO,
-    Need,
-    Needing,
-    automatic_unless,
-    choice,
-    closed_sides,
-    link,
-    needs_clip,
-    needs_smoke,
-    number,
-    operator,
-    tick,
-)
+from .common import UNDO, Need, Needing, needs_clip, needs_smoke, operator
 from .layout import draw_automatic, draw_closed
+from .settings import automatic_unless, choice, closed_sides, link, number, tick
 
 USUAL_DISTANCE = 2.0  # meters from which a distance is given by hand where there is no box
 

@@ -16,24 +16,10 @@ from ..scene.clip import frame_count, shown_frame, unseen_pictures, used_range
 from ..scene.pictures import is_distorted, undistorted
 from ..scene.smoke import active_smoke, free_folder, new_smoke
 from . import editors
-from .common import (
-    FILE,
-    HIDDEN,
-    UNDO,
-    ChoosesFile,
-    Need,
-    automatic_unless,
-    choice,
-    link,
-    needs_clip,
-    number,
-    operator,
-    string,
-    vector,
-    whole,
-)
+from .common import FILE, HIDDEN, UNDO, ChoosesFile, Need, needs_clip, operator
 from .editors import open_tab
 from .layout import draw_hint, draw_text
+from .settings import automatic_unless, choice, link, number, string, vector, whole
 
 UNCHANGED = ("first", "last", "folder", "fps", "plate_frames")  # settings that a clip of the same frames keeps
 

@@ -1,7 +1,4 @@
-"""How settings, operators and panels are declared, when they can be used, and how operators say what is in the way.
-
-A setting is one of Blender's properties, as ``number(name, limits)(tooltip)``.
-"""
+"""How operators and panels are declared, when they can be used, and how operators say what is in the way."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
@@ -10,7 +7,6 @@ import bpy
 from bpy import props
 
 from ..core import ShotError
-from ..core.contract import SIDES
 from ..result.side_job import writing_job
 from ..scene import volume
 from ..scene.smoke import active_smoke
@@ -23,8 +19,6 @@ HIDDEN = props.StringProperty(options={"SKIP_SAVE", "HIDDEN"})  # a text that a 
 
 Act = Callable[..., str | None]
 """Does something in a context with the active smoke; ShotError if something is in the way. What it returns is said."""
-
-Declared = Callable[..., Any]  # makes a property of its tooltip
 
 
 class Need(NamedTuple):
@@ -134,47 +128,3 @@ def panels(name: str, label: str, *needs: Need, **attributes: Any) -> Callable[[
         return tuple(classes)
 
     return made
-
-
-def speed_changed(_settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
-    """Play at the new speed."""
-    volume.synchronize_playback()
-
-
-def _named(kind: Callable[..., Any]) -> Callable[..., Declared]:
-    return lambda name, **options: lambda description: kind(name=name, description=description, **options)
-
-
-tick, number, whole, string, vector = map(
-    _named,
-    (props.BoolProperty, props.FloatProperty, props.IntProperty, props.StringProperty, props.FloatVectorProperty),
-)
-"""Something that is on or off, a number, a whole number, a text, and several numbers such as a color."""
-
-
-def choice(name: str, **options: Any) -> Declared:
-    """One of some items, which follow the tooltip; by default the first."""
-    return lambda tip, *items: props.EnumProperty(name=name, description=tip, items=items, **options)
-
-
-def link(name: str, kind: type, **options: Any) -> Declared:
-    """A data-block of a kind."""
-    return _named(props.PointerProperty)(name, type=kind, **options)
-
-
-def automatic_unless(name: str, label: str, start: float | Callable[[Any], float]) -> Any:
-    """A tick for a number that is chosen automatically where it is 0; ticked, the number begins with ``start``.
-
-    It keeps nothing of its own, so it cannot contradict the number.
-    """
-    return tick(
-        label,
-        get=lambda settings: getattr(settings, name) > 0,
-        set=lambda settings, on: setattr(settings, name, (start(settings) if callable(start) else start) if on else 0),
-    )(f"Choose {label} by hand; otherwise it is automatic")
-
-
-def closed_sides(description: str) -> Any:
-    """A row of buttons, one for each side of the box."""
-    items = [(side, f"{side[1]}{side[0].upper()}", "", 1 << place) for place, side in enumerate(SIDES)]
-    return choice("Closed Sides", options={"ANIMATABLE", "ENUM_FLAG"})(description, *items)

@@ -13,14 +13,14 @@ from ..core import ShotError
 from ..core.take import Take
 from ..result import smoke_takes
 from ..result.side_job import write_files
-from ..scene.background import lay_below, saved_strokes, strokes_at
-from ..scene.clip import number_in_file, shown_frame
+from ..scene.clip import lay_below, number_in_file, saved_strokes, shown_frame, strokes_at
 from ..scene.pictures import write_pictures
 from ..scene.scene_file import footage_tables
 from ..scene.smoke import active_smoke
-from .common import FOLDER, UNDO, OpensBrowser, choice, needs_clip, needs_rest, operator, panels
+from .common import FOLDER, UNDO, OpensBrowser, needs_clip, needs_rest, operator, panels
 from .editors import show_image
 from .layout import draw_text, draw_work
+from .settings import choice
 
 STROKES_FILE = "strokes.png"  # name of the image in the folder of the smoke's results
 COLORS = {"SMOKE": (0.0, 1.0, 0.0), "NOT_SMOKE": (1.0, 0.0, 0.0), "BEHIND": (0.0, 0.0, 1.0)}  # the engine's

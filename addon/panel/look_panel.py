@@ -9,8 +9,9 @@ from ..scene import look, shot_setup, volume
 from ..scene.modifiers import CAN_INTERPOLATE, PROXY, in_viewport
 from ..scene.plate import clip_behind
 from ..scene.smoke import is_override, smoke_with_look
-from .common import UNDO, Need, choice, link, needs_clip, needs_result, operator, panels, speed_changed, tick
+from .common import UNDO, Need, needs_clip, needs_result, operator, panels
 from .layout import draw_automatic, draw_settings, draw_text, draw_work
+from .settings import choice, link, tick
 
 SHORT = {"Absorption Color": "Absorption"}  # names of inputs that the sidebar would cut off
 
@@ -18,12 +19,12 @@ SHORT = {"Absorption Color": "Absorption"}  # names of inputs that the sidebar w
 class PlaybackSettings:
     """How a result is played."""
 
-    speed: choice("Speed", update=speed_changed)(
+    speed: choice("Speed", update=volume.synchronize_playback)(
         "Speed of the smoke if clip and scene differ in frame rate",
         ("FRAMES", "Frame by Frame", "One frame of the clip in each frame of the scene, as Blender plays clips"),
         ("REAL", "Real Time", "As fast as in reality"),
     )
-    between: tick("Frames Between", update=speed_changed)(
+    between: tick("Frames Between", update=volume.synchronize_playback)(
         "At another speed than the clip's, compute what lies between two frames with their velocity, while it is "
         "shown and rendered. Blender can do so since 5.0"
     )

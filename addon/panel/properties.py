@@ -13,12 +13,12 @@ from ..scene.blender import PACKAGE, PATH_OPTIONS
 from ..scene.smoke import is_smoke
 from .camera_panel import ShotSettings
 from .clip_panel import ClipSettings
-from .common import Need, Needing, automatic_unless, choice, link, operator, string, tick, whole
-from .direct_panel import DirectSettings
-from .export_panel import ExportSettings
+from .common import Need, Needing, operator
+from .direct_panel import DirectSettings, ExportSettings
 from .layout import draw_automatic, draw_settings
 from .look_panel import PlaybackSettings, SetUpSettings
 from .quality_panel import QualitySettings
+from .settings import automatic_unless, choice, link, string, tick, whole
 
 MANUAL = Path(__file__).parents[1] / "manual" / "index.html"  # the manual, which the extension brings along
 FOLDER = "smokelift"  # below the user's folder of presets

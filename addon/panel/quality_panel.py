@@ -6,8 +6,9 @@ from bpy.app.translations import pgettext_iface as iface_
 from ..core.contract import BOX_VOXELS
 from ..core.sentences import duration
 from ..result import shot_check
-from .common import automatic_unless, choice, needs_clip, number, operator, whole
+from .common import needs_clip, operator
 from .layout import draw_doubts, draw_failure, draw_text
+from .settings import automatic_unless, choice, number, whole
 
 SEEDS = 2**31  # numbers of variations: as many as Blender's whole numbers have from 0
 CELLS = 0.245, 0.215, 0.18, 0.18  # fractions of a line: button, time, memory, disk; the rest is what is lost

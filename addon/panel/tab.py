@@ -121,7 +121,7 @@ def draw_run(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.
         first, last = volume.shown_range(smoke)
         if smoke.data.sequence_mode == "CLIP" and not first <= context.scene.frame_current <= last:
             draw_text(layout, "The smoke is seen in frames {:d} to {:d}.", "INFO", first, last)
-        if known := volume.provenance_note(smoke):
+        if known := smoke.data.get(volume.PROVENANCE):
             draw_text(layout, known, "INFO")
         if now.complete and lacks_proxy(smoke, now.scene["domain"]):
             text = "This smoke is large: a proxy keeps the viewport fast."

@@ -148,8 +148,7 @@ def _effectors(smoke: bpy.types.Object) -> list[bpy.types.Object]:
 
 def _kind(obj: bpy.types.Object) -> str:
     """The force field of an object, or NONE."""
-    kind: str = "NONE" if obj.field is None else obj.field.type
-    return kind
+    return "NONE" if obj.field is None else obj.field.type
 
 
 def _world_to_smoke(smoke: bpy.types.Object) -> Matrix:

@@ -81,7 +81,7 @@ def write_asset(smoke: bpy.types.Object, folder: Path) -> None:
     # as it is when the asset is used; nothing of this file but its material goes with it
     copy.location = (0.0, 0.0, 0.0)
     copy.asset_mark()
-    copy.asset_data.description = volume.provenance_note(smoke)
+    copy.asset_data.description = smoke.data.get(volume.PROVENANCE, "")
     try:
         bpy.data.libraries.write(str(folder / ASSET_FILE), {copy}, path_remap="RELATIVE_ALL", compress=True)
     finally:

@@ -18,7 +18,7 @@ from ..core import ShotError
 from ..core.job import Job
 from ..core.take import Take
 from ..scene.blender import call_later, cancel_call, redraw, thread_options
-from ..scene.box import box_corners, box_of
+from ..scene.geometry import box_corners, box_of
 from ..scene.scene_file import options, shot_files, shot_tables
 from ..scene.smoke import active_smoke, find_smoke, scene_of, smokes
 from .side_job import REST_SECONDS, SideJob

@@ -10,7 +10,7 @@ from typing import Any
 import bpy
 from mathutils import Matrix, Vector
 
-from .box import engine_to_world
+from .geometry import engine_to_world
 from .nodes import SINCE_5, Socket, Tree, add_node, color, compositor, feed, file_group, number, set_kind
 from .plate import shown_background, synchronize_plate
 from .smoke import scene_of

@@ -13,7 +13,7 @@ import bpy
 from mathutils import Color, Matrix, Vector
 
 from .blender import relative, set_unless_changed
-from .box import engine_to_world
+from .geometry import engine_to_world
 from .nodes import Input, Socket, Tree, add_node, empty_material, file_group, math_node, number, vector_node
 from .smoke import scene_of
 from .volume import frames_before, shown, shown_take

@@ -14,11 +14,19 @@ from mathutils import Matrix, Vector
 
 from ..core import ShotError
 from ..core.contract import IMAGE_SUFFIXES, PANORAMA_SUFFIXES, SIDES
-from .background import background_table
 from .blender import absolute, at_frame, file_of
-from .box import box_corners, box_of, domain_table, has_inlet, in_scene, inlet_table, is_inside, keep_camera_outside
-from .camera import camera_over_frames
-from .clip import clip_table, start_frame
+from .clip import background_table, clip_table, start_frame
+from .geometry import (
+    box_corners,
+    box_of,
+    camera_over_frames,
+    domain_table,
+    has_inlet,
+    in_scene,
+    inlet_table,
+    is_inside,
+    keep_camera_outside,
+)
 from .pictures import mask_path
 from .smoke import scene_of
 

@@ -11,7 +11,7 @@ from mathutils import Vector
 from ..core.contract import DIRECTIONS, FRAME_FILE, MADE_UP, PROXY_FILE, retiming
 from ..core.take import TITLES, Snapshot, Take
 from .blender import absolute, file_of, frame_rate, relative, set_unless_changed
-from .box import engine_to_world
+from .geometry import engine_to_world
 from .look import fit_look
 from .modifiers import FRAMES_BETWEEN, PROXY, drive_interpolation, fit_interpolation, fit_proxy
 from .smoke import scene_of, smokes
@@ -151,15 +151,10 @@ def go_to_smoke(smoke: bpy.types.Object) -> bool:
     return True
 
 
-def provenance_note(smoke: bpy.types.Object) -> str:
-    """What of a smoke is measured and what is not, as a line for the panel; empty if that is unknown."""
-    return smoke.data.get(PROVENANCE, "")
-
-
 def _provenance(now: Snapshot, before: int) -> str:
-    """The line; of what was done last after the clip, with its frames counted on from the clip's.
+    """The line for the panel, with frames counted on from the clip's; empty if nothing is known.
 
-    What was done before names frames of an earlier result, which are others in this one.
+    Of what was done after the clip it says the last: what was done before names frames of an earlier result.
     """
     parts = now.index.get("provenance", [])
     done = [part for part in parts if part["what"] in DIRECTIONS]
@@ -190,8 +185,8 @@ def correct_positions(_file: str = "") -> None:
         _correct_position(smoke, now)
 
 
-def synchronize_playback() -> None:
-    """Play all smokes in step with their clips, after a clip or a scene got another time or rate."""
+def synchronize_playback(_settings: object = None, _context: object = None) -> None:
+    """Play all smokes in step with their clips, after clip, scene or smoke got another time or speed."""
     for smoke, now in _all_shown():
         _set_time(smoke, now)
 

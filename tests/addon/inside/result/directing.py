@@ -12,7 +12,7 @@ from addon.core import ShotError
 from addon.core.take import Take, takes
 from addon.result import directing, smoke_takes
 from addon.scene import volume
-from addon.scene.box import new_box
+from addon.scene.geometry import new_box
 from addon.scene.smoke import activate, smokes
 from conftest import changed, known_run
 from smokelift.direct.mesh import Mesh
@@ -153,7 +153,7 @@ def test_meshes_that_move(shot, result, acting, tmp_path) -> None:
     part = DOMAIN.slices_in(moved.scene.domain)
     assert not moved.density(FRAMES + 5)[part][wanted].any()
     assert len(smokes(bpy.context.scene)) == 1
-    assert "Frames 7 to 11 are a simulation" in volume.provenance_note(result)
+    assert "Frames 7 to 11 are a simulation" in result.data[volume.PROVENANCE]
     build = obj.modifiers.new("Build", "BUILD")
     build.frame_start, build.frame_duration = last, 10
     with pytest.raises(ShotError, match="number of triangles"):

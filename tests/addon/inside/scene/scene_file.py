@@ -12,7 +12,7 @@ from mathutils import Euler, Matrix, Vector
 from addon.core import ShotError
 from addon.core.contract import BOX_VOXELS
 from addon.core.take import Take
-from addon.scene.box import box_corners, engine_to_world
+from addon.scene.geometry import box_corners, engine_to_world
 from addon.scene.scene_file import options, shot_tables
 from conftest import save_image
 from smokelift.scene import Scene

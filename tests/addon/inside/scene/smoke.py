@@ -11,7 +11,7 @@ from addon.core.take import Take, takes
 from addon.result import smoke_takes
 from addon.scene import shot_setup, volume
 from addon.scene.blender import absolute
-from addon.scene.box import new_box
+from addon.scene.geometry import new_box
 from addon.scene.smoke import active_smoke, hide_default_cube, new_smoke
 from conftest import changed, made, ticked
 from tests.example_shot import EXAMPLE, add, add_box, add_camera, smoke

@@ -11,7 +11,7 @@ from mathutils import Vector
 from addon.core.take import Take
 from addon.result import smoke_takes
 from addon.scene import look, shot_setup, volume
-from addon.scene.box import box_corners
+from addon.scene.geometry import box_corners
 from conftest import FRAMES, changed, made, played, quietly, rendered
 from smokelift.output.images import write_image, write_video
 from smokelift.scene import Camera, Medium, Scene, scene_to_dict
@@ -205,17 +205,16 @@ MADE = "degrees beside it. Made up: Depth Detail 0.5, Variation 3."
 )
 def test_what_is_made_up_is_said(shot, tmp_path, parts, said) -> None:
     """With the clip's frames; those of earlier results are not said of what was made of them."""
-    assert volume.provenance_note(smoke(shot)) == ""
+    assert smoke(shot).data.get(volume.PROVENANCE, "") == ""
     take = made(tmp_path, used=[39, 44])
     with changed(take) as index:
         index["provenance"] = parts
     volume.show(smoke(shot), take)
-    note = volume.provenance_note(smoke(shot))
+    note = smoke(shot).data[volume.PROVENANCE]
     assert said in note and bool(note) == bool(parts)
     assert ("simulation" in note) == (said.startswith("Frames"))
-    assert smoke(shot).data[volume.PROVENANCE] == note
     volume.show(smoke(shot), made(tmp_path, number=2))
-    assert volume.provenance_note(smoke(shot)) == ""
+    assert smoke(shot).data.get(volume.PROVENANCE, "") == ""
 
 
 def test_a_new_result_replaces_the_old_one_and_what_was_changed_of_its_material_stays(shot, tmp_path) -> None:

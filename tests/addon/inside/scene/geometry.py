@@ -6,7 +6,7 @@ import pytest
 from mathutils import Vector
 
 from addon.core import ShotError
-from addon.scene.camera import Floor
+from addon.scene.geometry import Floor
 from addon.scene.scene_file import shot_tables
 from smokelift.density.upright_plane import depth_at
 from smokelift.scene import Scene, scene_from_dict
