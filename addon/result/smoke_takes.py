@@ -11,10 +11,10 @@ import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..core import ShotError
-from ..core.job import Job
+from ..core.job import Job, engine_command
 from ..core.take import Take, new_take, takes
 from ..scene import shot_setup, volume
-from ..scene.blender import absolute, file_of, preferred, relative
+from ..scene.blender import absolute, file_of, preferred, relative, thread_options
 from ..scene.scene_file import options as engine_options
 from ..scene.scene_file import shot_files, shot_tables
 from ..scene.smoke import active_smoke, hide_default_cube, is_smoke, scene_of, separate_duplicate, smokes
@@ -160,6 +160,12 @@ def _note_file(*used: Take) -> None:
     if bpy.data.filepath:
         for take in used:
             take.note_file(Path(bpy.data.filepath))
+
+
+def engine_job(smoke: bpy.types.Object, take: Take) -> Job:
+    """The engine's process that makes or resumes a take; ShotError if that cannot be."""
+    words = engine_command(take.arguments() + thread_options())
+    return Job(words, take.log_file, volume.frames_before(smoke, take), take.read().frames)
 
 
 def update_moved_files(smoke: bpy.types.Object, take: Take) -> None:

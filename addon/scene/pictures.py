@@ -93,7 +93,7 @@ def undistorted(clip: bpy.types.MovieClip, folder: Path) -> bpy.types.MovieClip:
     return made
 
 
-def mask_path(smoke: bpy.types.Object, quick: bool = False) -> Path | None:
+def mask_path(smoke: bpy.types.Object, quick: bool) -> Path | None:
     """The picture of a smoke's mask, or the pattern of those that it has for every frame; None without a mask.
 
     A ``quick`` one is of the current frame only. ShotError if the file is missing, or nothing is drawn.
@@ -140,21 +140,16 @@ def _drawn(smoke: bpy.types.Object, quick: bool) -> Path:
         scene.render.filepath = str(folder / "drawn_")
         made: dict[str, Path] = {}
         for frame, shape, file in zip(frames, looks, files, strict=False):
-            if shape not in made:
-                made[shape] = _rendered(scene, frame).replace(file)
-            else:
+            if shape in made:
                 shutil.copyfile(made[shape], file)
+                continue
+            scene.frame_start = scene.frame_end = frame
+            try:  # as an animation of one frame, since a still shows masks as they are in the window
+                bpy.ops.render.render(animation=True, scene=scene.name)
+            except RuntimeError as error:
+                raise ShotError(f"The mask cannot be drawn: {error}") from error
+            made[shape] = Path(scene.render.frame_path(frame=frame)).replace(file)
     return found
-
-
-def _rendered(scene: bpy.types.Scene, frame: int) -> Path:
-    """Render a frame: as an animation of one, since a still shows masks as they are in the window."""
-    scene.frame_start = scene.frame_end = frame
-    try:
-        bpy.ops.render.render(animation=True, scene=scene.name)
-    except RuntimeError as error:
-        raise ShotError(f"The mask cannot be drawn: {error}") from error
-    return Path(scene.render.frame_path(frame=frame))
 
 
 def _shape(scene: bpy.types.Scene, mask: bpy.types.Mask, frame: int) -> str:

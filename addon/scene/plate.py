@@ -76,7 +76,6 @@ def show_plate_behind(smoke: bpy.types.Object, camera: bpy.types.Camera) -> None
 
     The second time only the picture changes: what the artist shows or hides stays.
     """
-    camera.show_background_images = True
     pictures, (plate, color) = camera.background_images, shown_background(smoke)
     image = plate or bpy.data.images.get(BACKGROUND) or bpy.data.images.new(BACKGROUND, 8, 8)
     if plate is None:
@@ -90,19 +89,18 @@ def show_plate_behind(smoke: bpy.types.Object, camera: bpy.types.Camera) -> None
             pictures.remove(clip)  # it would be below
         picture = _new_picture(camera, "IMAGE")
         picture.frame_method = "STRETCH"
-        _new_picture(camera, "MOVIE_CLIP").clip = smoke.smokelift.clip
-        clip_behind(smoke, camera).show_background_image = False
-    picture.image = image
+        show_clip_behind(smoke, camera, False)
+    camera.show_background_images, picture.image = True, image
     if plate is not None:
         synchronize_plate(smoke, plate, picture.image_user)
 
 
-def show_clip_behind(smoke: bpy.types.Object, camera: bpy.types.Camera) -> None:
-    """Show the clip in the view through a camera, behind everything."""
+def show_clip_behind(smoke: bpy.types.Object, camera: bpy.types.Camera, visible: bool = True) -> None:
+    """Show the clip in the view through a camera, behind everything, or have it there at a switch."""
     camera.show_background_images = True
     if clip_behind(smoke, camera) is None:
         _new_picture(camera, "MOVIE_CLIP").clip = smoke.smokelift.clip
-    clip_behind(smoke, camera).show_background_image = True
+    clip_behind(smoke, camera).show_background_image = visible
 
 
 def clip_behind(smoke: bpy.types.Object, camera: bpy.types.Camera) -> bpy.types.CameraBackgroundImage | None:

@@ -63,15 +63,15 @@ def show_beside(smoke: bpy.types.Object, take: Take) -> bpy.types.Object:
     return copy
 
 
+def shown_take(obj: bpy.types.Object) -> Take | None:
+    """The take that a smoke, or another Volume object, shows."""
+    return take_of(obj.data)
+
+
 def take_of(volume: bpy.types.Volume) -> Take | None:
     """The take that a Volume plays; None for one without a file, whose empty path saving turns into ``//``."""
     path = file_of(volume)
     return Take(path.parent) if path.suffix == ".vdb" else None
-
-
-def shown_take(smoke: bpy.types.Object) -> Take | None:
-    """The take that a smoke shows."""
-    return take_of(smoke.data)
 
 
 def shown(smoke: bpy.types.Object) -> Snapshot | None:
@@ -90,12 +90,6 @@ def take_before(smoke: bpy.types.Object) -> Take | None:
 def directories_on_show() -> set[Path]:
     """Directories, without links, of the takes that Volumes of this file show."""
     return {take.directory.resolve() for data in bpy.data.volumes if (take := take_of(data)) is not None}
-
-
-def number_at(smoke: bpy.types.Object, frame: int) -> int:
-    """The number in the take that a smoke shows in a frame of its scene, without a live timing."""
-    first, steps = _pace(smoke)
-    return first + math.floor((frame - smoke.data.frame_start + EARLY) / steps)
 
 
 def scene_frame(smoke: bpy.types.Object, number: int) -> int:
@@ -145,7 +139,8 @@ def go_to_smoke(smoke: bpy.types.Object) -> bool:
     smoky = [int(n) for n, figures in now.index["frames"].items() if figures.get("mass", 1.0) > 0.0] if now else []
     if not smoky:
         return False
-    number = number_at(smoke, scene.frame_current)
+    first, steps = _pace(smoke)
+    number = first + math.floor((scene.frame_current - smoke.data.frame_start + EARLY) / steps)
     if number not in smoky and not now.numbers[-1] < number <= _last_planned(now):
         scene.frame_set(scene_frame(smoke, min(smoky)))
     return True
