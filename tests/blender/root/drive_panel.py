@@ -41,7 +41,6 @@ SUB_PANELS = ("results", "advanced", "look", "set_up", "direct", "export")
 
 
 def story() -> Iterator[float]:
-    """What the artist does."""
     window, area = first_window(), largest_area("VIEW_3D")
     space = area.spaces.active
     space.region_3d.view_perspective = "CAMERA"
@@ -149,7 +148,6 @@ def sub_panels(window: bpy.types.Window, area: bpy.types.Area) -> Iterator[float
 
 
 def volume(window: bpy.types.Window) -> bpy.types.Object:
-    """The smoke."""
     return next(obj for obj in window.scene.objects if obj.type == "VOLUME")
 
 

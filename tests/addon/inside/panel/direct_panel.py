@@ -10,7 +10,6 @@ from tests.example_shot import smoke
 
 
 def select(*objects: bpy.types.Object) -> None:
-    """Select these alone."""
     for obj in bpy.context.view_layer.objects:
         obj.select_set(obj in objects)
 

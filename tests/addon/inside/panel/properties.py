@@ -15,7 +15,6 @@ from tests.example_shot import EXAMPLE
 
 @pytest.fixture
 def user(blender) -> Iterator[bpy.types.AddonPreferences]:
-    """The preferences of a user who has the add-on installed."""
     entry = bpy.context.preferences.addons.new()
     entry.module = PACKAGE
     yield entry.preferences

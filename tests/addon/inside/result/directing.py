@@ -26,7 +26,6 @@ FRAMES = 6
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
-    """A take of six frames."""
     folder = tmp_path_factory.mktemp("made")
     take = Take(folder / "take_0001")
     take.write({"clip": {"path": "clip.mp4"}}, [])
@@ -49,7 +48,6 @@ def result(shot, made, tmp_path):
 
 @pytest.fixture
 def acting(shot, result) -> bpy.types.Collection:
-    """The collection of what acts on the smoke."""
     collection = bpy.data.collections.new("Effectors")
     shot.collection.children.link(collection)
     result.smokelift.directing.effectors = collection
@@ -81,7 +79,6 @@ def words(options: list[str], name: str) -> list[list[float]]:
 
 
 def solid(content: bytes, tmp_path) -> np.ndarray:
-    """The voxels of an STL file."""
     (tmp_path / "mesh.stl").write_bytes(content)
     return Mesh.read(tmp_path / "mesh.stl").voxels(DOMAIN)
 

@@ -28,7 +28,6 @@ def project(shot, tmp_path) -> Path:
 
 
 def finished(direction: str = "", source: Take | None = None) -> Take:
-    """A new take of the smoke, as a run leaves it."""
     obj = smoke(bpy.context.scene)
     take = smoke_takes.write_take(obj)
     if source is not None:

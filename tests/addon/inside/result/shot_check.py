@@ -10,10 +10,9 @@ import pytest
 
 from addon.core.contract import QUALITIES
 from addon.result import shot_check, side_job, smoke_takes
-from tests.addon.inside.panel.tab import words
+from tests.addon.inside.panel.tab import FIGURES, words
 from tests.example_shot import smoke
 
-FIGURES = {"resolution": [48, 48, 64], "seconds": 12, "memory": 2**28, "memory_free": 2**33, "disk": 3e7, "lost": 0.1}
 FOUND = {"qualities": dict.fromkeys(QUALITIES, FIGURES), "background_color": [0.5, 0.6, 0.7]}
 DONE = {"event": "done", "text": "Done.", **FOUND}
 ENGINE = f"""

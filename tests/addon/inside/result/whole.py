@@ -50,7 +50,6 @@ def choose(scene: bpy.types.Scene, folder: Path) -> None:
 
 
 def cut_off(run: smokelift.Reconstruction, folder: Path, count: int) -> None:
-    """A run that ends after so many frames."""
 
     def cancel(frame: smokelift.Frame) -> None:
         if frame.number == count:

@@ -20,8 +20,7 @@ from tests.example_shot import EXAMPLE, smoke
 # frames of the clip as the clean plate
 
 
-def test_frames_without_smoke_are_the_plate(shot, tmp_path) -> None:
-    settings = smoke(shot).smokelift
+def test_frames_without_smoke_are_the_plate(shot, settings, tmp_path) -> None:
     settings.clip.frame_start, settings.clip.frame_offset = 101, 3
     for frame in (103, 101, 103):
         shot.frame_set(frame)
@@ -33,8 +32,7 @@ def test_frames_without_smoke_are_the_plate(shot, tmp_path) -> None:
     assert "background" not in footage_tables(smoke(shot))
 
 
-def test_frames_that_the_clip_does_not_have_are_refused(shot) -> None:
-    settings = smoke(shot).smokelift
+def test_frames_that_the_clip_does_not_have_are_refused(shot, settings) -> None:
     settings.plate_mode = "FRAMES"
     for text, said in (("", "press Plate from This Frame"), ("0", "has frames 1 to"), ("2, x", "Frames 2, x are not")):
         settings.plate_frames = text
@@ -49,9 +47,8 @@ def test_frames_that_the_clip_does_not_have_are_refused(shot) -> None:
     assert settings.plate_frames == ""
 
 
-def test_one_color_is_the_background(shot) -> None:
+def test_one_color_is_the_background(shot, settings) -> None:
     """As the engine asks for it where the clip does not show what is behind its smoke."""
-    settings = smoke(shot).smokelift
     settings.plate_mode = "COLOR"
     assert footage_tables(smoke(shot))["background"] == {"color": [0.0, 0.0, 0.0]}
     settings.plate_color = (0.25, 0.5, 2.0)
@@ -92,9 +89,8 @@ def test_the_view_has_the_plate_of_the_render_and_the_clip_at_a_switch(shot, tmp
     assert (plate.show_background_image, clip.show_background_image) == (False, True)
 
 
-def test_the_color_begins_with_the_one_that_was_found(shot) -> None:
+def test_the_color_begins_with_the_one_that_was_found(shot, settings) -> None:
     """Unless there is none, or one was chosen; another clip has another."""
-    settings = smoke(shot).smokelift
     for found, chosen, wanted in ((None, None, 0.0), (0.5, None, 0.5), (0.7, None, 0.5), (0.7, 0.9, 0.9)):
         know(shot, background_color=None if found is None else [found] * 3)
         settings.plate_mode = "ESTIMATE"
@@ -118,9 +114,8 @@ def paint(image: bpy.types.Image, color: tuple[float, float, float], opacity: fl
     image.pixels.foreach_set(values[::-1].ravel())
 
 
-def test_strokes_are_painted_on_the_clips_frame(shot, tmp_path) -> None:
+def test_strokes_are_painted_on_the_clips_frame(shot, settings, tmp_path) -> None:
     """Below them is the clip; the file has the strokes alone, and follows before a run."""
-    settings = smoke(shot).smokelift
     settings.output = str(tmp_path / "out")
     shot.frame_set(20)
     assert bpy.ops.smokelift.paint_strokes() == {"FINISHED"}

@@ -45,7 +45,6 @@ def shown(scene: bpy.types.Scene, tmp_path, **inputs: float) -> np.ndarray:
 
 
 def tree(scene: bpy.types.Scene) -> bpy.types.NodeTree:
-    """The scene's compositor."""
     return scene.compositing_node_group if compositing.SINCE_5 else scene.node_tree
 
 

@@ -29,7 +29,6 @@ def clicked(scene: bpy.types.Scene, *points: tuple[float, float, float]) -> floa
 
 
 def engines(scene: bpy.types.Scene) -> Scene:
-    """The scene as the engine reads it."""
     bpy.context.view_layer.update()
     return scene_from_dict(shot_tables(smoke(scene)))
 

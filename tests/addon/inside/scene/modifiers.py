@@ -16,7 +16,6 @@ from tests.example_shot import add_camera, set_world, smoke
 
 @pytest.fixture
 def obj(scene, tmp_path) -> bpy.types.Object:
-    """A smoke with a proxy."""
     return volume.show(smoke(scene), made(tmp_path, proxies=True))
 
 

@@ -41,7 +41,6 @@ def bent(scene, tmp_path) -> bpy.types.Scene:
 
 
 def line(picture: np.ndarray, row: int) -> float:
-    """Column of the bright line in a row."""
     weights = np.maximum(picture[row, : SIZE // 2, 0] - 0.5, 0.0)
     return float(np.average(np.arange(SIZE // 2), weights=weights))
 
@@ -113,9 +112,8 @@ def white(picture: Path) -> np.ndarray:
     return values > 0.5
 
 
-def test_inside_its_lines_smoke_may_be(shot) -> None:
+def test_inside_its_lines_smoke_may_be(shot, settings) -> None:
     """Where Blender's Mask node has them: a mask is measured from the middle, in shares of the longer side."""
-    settings = smoke(shot).smokelift
     settings.mask = "//no such file.png"  # what is drawn comes first
     draw(shot)
     table = footage_tables(smoke(shot))["clip"]
@@ -150,9 +148,8 @@ def move(scene: bpy.types.Scene, line: bpy.types.MaskSpline, keys: dict[int, tup
             assert bpy.ops.mask.shape_key_insert() == {"FINISHED"}
 
 
-def test_a_mask_that_moves_has_a_picture_for_every_frame_of_the_file(shot) -> None:
+def test_a_mask_that_moves_has_a_picture_for_every_frame_of_the_file(shot, settings) -> None:
     """By the numbers that the engine counts the frames by; a check takes the current frame's alone."""
-    settings = smoke(shot).smokelift
     settings.clip.frame_start, settings.clip.frame_offset = 101, 3
     settings.first, settings.last = 5, 9
     line = draw(shot)
@@ -187,9 +184,8 @@ def test_a_line_that_is_not_closed_says_what_to_do(shot) -> None:
 
 
 @pytest.mark.parametrize("moves", [False, True])
-def test_a_result_keeps_the_mask_that_it_was_made_with(shot, tmp_path, moves) -> None:
+def test_a_result_keeps_the_mask_that_it_was_made_with(shot, settings, tmp_path, moves) -> None:
     """Also where its folder is moved, or another file was chosen meanwhile; it goes with the result."""
-    settings = smoke(shot).smokelift
     settings.output = str(tmp_path / "out")
     line = draw(shot)
     if moves:
@@ -231,8 +227,7 @@ def test_a_mask_that_is_drawn_on_is_checked_anew(shot) -> None:
     assert not state.settings
 
 
-def test_there_is_one_mask_that_is_drawn_on_a_frame_that_is_used(shot) -> None:
-    settings = smoke(shot).smokelift
+def test_there_is_one_mask_that_is_drawn_on_a_frame_that_is_used(shot, settings) -> None:
     settings.first, settings.last = 21, 30
     for frame, shown in ((5, 21), (25, 25)):
         shot.frame_set(frame)

@@ -28,7 +28,6 @@ def engines(scene: bpy.types.Scene, folder: Path) -> Scene:
 
 
 def refusal(scene: bpy.types.Scene) -> str:
-    """The sentence with which a shot is refused."""
     with pytest.raises(ShotError) as caught:
         shot_tables(smoke(scene))
     return str(caught.value)
@@ -300,9 +299,8 @@ def test_an_inlet(shot, tmp_path) -> None:
     assert engines(shot, tmp_path).inlets == ()
 
 
-def test_a_distance(shot) -> None:
+def test_a_distance(shot, settings) -> None:
     """Said to the engine if it is given, unless an inlet says it; by hand it begins at the middle of the box."""
-    settings = smoke(shot).smokelift
     assert not any(word.startswith("--distance") for word in options(smoke(shot)))
     bpy.context.view_layer.update()
     settings.use_distance = True
@@ -383,9 +381,8 @@ def test_world_pictures_that_cannot_be_used(shot, panorama) -> None:
 # medium
 
 
-def test_a_medium_of_ones_own(shot, tmp_path) -> None:
+def test_a_medium_of_ones_own(shot, settings, tmp_path) -> None:
     assert engines(shot, tmp_path).medium is None
-    settings = smoke(shot).smokelift
     settings.use_medium, settings.extinction, settings.albedo, settings.anisotropy = True, 7.0, 0.5, -0.25
     medium = engines(shot, tmp_path).medium
     assert (medium.extinction, medium.albedo, medium.anisotropy) == (7.0, 0.5, -0.25)

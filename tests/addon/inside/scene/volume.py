@@ -21,7 +21,6 @@ HALF_VOXEL_TOO_FAR = bpy.app.version < (5, 0, 0)
 
 
 def plays(scene: bpy.types.Scene, frame: int) -> int | None:
-    """Number of the file that is seen in a frame."""
     name = played(smoke(scene), frame)
     return int(name[6:10]) if name else None
 
@@ -181,7 +180,6 @@ def test_the_material_is_the_mediums(shot, tmp_path) -> None:
 
 
 def part(what: str, how: str = "", origin: str = "made up", **settings: float) -> dict[str, object]:
-    """A part of a provenance."""
     return {"what": what, "origin": origin, "how": how, "settings": settings}
 
 
@@ -233,12 +231,11 @@ def test_a_new_result_replaces_the_old_one_and_what_was_changed_of_its_material_
     assert obj.data.display.density == 1.5
 
 
-def test_it_survives_saving_and_loading(shot, tmp_path) -> None:
+def test_it_survives_saving_and_loading(shot, settings, tmp_path) -> None:
     """Settings, smoke, material; the files are found relative to the .blend, also after the folder moved."""
     home = tmp_path / "home"
     home.mkdir()
     bpy.ops.wm.save_as_mainfile(filepath=str(home / "shot.blend"))
-    settings = smoke(shot).smokelift
     settings.first, settings.last, settings.quality, settings.output = 3, 8, "fine", "//out"
     shot.render.fps, settings.speed = 48, "REAL"
     volume.show(smoke(shot), made(home / "out"))
