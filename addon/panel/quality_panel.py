@@ -116,7 +116,6 @@ def draw_check(layout: bpy.types.UILayout, smoke: bpy.types.Object, said: set[st
 
 
 def _cells(column: bpy.types.UILayout) -> list[bpy.types.UILayout]:
-    """The cells of a line of the table of qualities."""
     cells, left = [], 1.0
     for fraction in CELLS:
         column = column.split(factor=fraction / left, align=True)

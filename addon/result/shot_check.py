@@ -192,7 +192,6 @@ def _start(smoke: bpy.types.Object, needs_page: bool) -> None:
 
 
 def _page(shot: str) -> Path:
-    """The picture of what was found in a shot, by its fingerprint."""
     return Path(bpy.app.tempdir) / f"smokelift_inspect_{shot}.png"
 
 

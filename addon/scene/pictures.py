@@ -153,7 +153,6 @@ def _drawn(smoke: bpy.types.Object, quick: bool) -> Path:
 
 
 def _shape(scene: bpy.types.Scene, mask: bpy.types.Mask, frame: int) -> str:
-    """How a mask looks in a frame, as a text to compare it by."""
     scene.frame_set(frame)
     layers = mask.evaluated_get(scene.view_layers[0].depsgraph).layers
     points = [point for layer in layers for line in layer.splines for point in line.points]

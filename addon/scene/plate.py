@@ -181,7 +181,6 @@ def _projector(smoke: bpy.types.Object, table: dict[str, Any]) -> bpy.types.Obje
 
 
 def _animate(obj: bpy.types.Object, poses: list[Matrix], first: int) -> None:
-    """Key the place of an object in every frame from the first on."""
     obj.animation_data_clear()
     obj.rotation_mode = "QUATERNION"
     before = None

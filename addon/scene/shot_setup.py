@@ -176,7 +176,6 @@ def _estimated_suns(scene: bpy.types.Scene, fitted: dict[str, Any], tables: list
 
 
 def _is_estimated(obj: bpy.types.Object) -> bool:
-    """Whether an object is a light of ours."""
     return f"{obj.name} ".startswith(f"{NAME} Light ")
 
 
