@@ -18,10 +18,7 @@ MODULES = (
 
 
 def register() -> None:
-    """Register all classes, properties and handlers.
-
-    ShotError if the zip is for another Blender, which its preferences show when they enable the add-on.
-    """
+    """Register all of it; ShotError, which Blender's preferences show, if the zip is for another Blender."""
     from .core.job import require_fitting_zip
 
     require_fitting_zip()

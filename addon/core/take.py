@@ -64,10 +64,7 @@ class Take:
         return self.directory.with_suffix(".png")
 
     def copy_mask(self, drawn: Path) -> str:
-        """Copy the mask that was drawn for it, so that another does not change it; returns what its scene file has.
-
-        It is a picture ``mask.png``, or the pattern ``mask_####.png`` of numbered ones. ShotError if that fails.
-        """
+        """Copy its drawn mask, a picture or a pattern; returns what its scene file has. ShotError if that fails."""
         files = drawn.parent.glob(drawn.name.replace("####", "*"))
         self._write({Path(f"{self.directory}_{file.name}"): file.read_bytes() for file in files})
         return f"{self.directory.name}_{drawn.name}"
@@ -125,10 +122,7 @@ class Take:
         return file.is_file() or ("#" in file.name and any(file.parent.glob(re.sub("#+", "[0-9]*", file.name))))
 
     def arguments(self) -> list[str]:
-        """The engine's arguments, which start this take or resume it.
-
-        ShotError if its files are missing or damaged, or hold an option that does not decide its result.
-        """
+        """The engine's arguments, which start or resume it; ShotError if files are damaged, or hold other options."""
         now = self.read()
         direction, source, options = now.direction, now.source, now.options
         if options is None:

@@ -35,10 +35,7 @@ needs_rest = Need("Other files are being written: wait for them, or cancel that"
 
 
 class Needing:
-    """What Blender offers only where nothing that it needs is missing; the first that is says so.
-
-    Its identifier is that of its class.
-    """
+    """What Blender offers only where nothing that it needs is missing; the first that is says so."""
 
     needs: Sequence[Need] = ()
 
@@ -104,11 +101,10 @@ Draw = Callable[[bpy.types.UILayout, bpy.types.Context, bpy.types.Object], None]
 
 
 def panels(name: str, label: str, *needs: Need, **attributes: Any) -> Callable[[Draw], tuple[type, ...]]:
-    """Make of what draws it a panel of the tab in both editors, whose classes have further attributes.
+    """Make of what draws it a panel of the tab in both editors, SMOKELIFT_PT_view_NAME and SMOKELIFT_PT_clip_NAME.
 
-    Blender knows them as SMOKELIFT_PT_view_NAME and SMOKELIFT_PT_clip_NAME. Without a name it is the tab itself,
-    with one a part of it, closed at first. Names of settings are drawn on their left. It is shown where nothing is
-    missing that it needs.
+    Without a name it is the tab itself, with one a part of it, closed at first, and shown where nothing that it needs
+    is missing. Names of settings are drawn on their left. Its classes have further attributes.
     """
 
     def made(draw: Draw) -> tuple[type, ...]:

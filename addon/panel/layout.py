@@ -59,10 +59,9 @@ def draw_progress(layout: bpy.types.UILayout, work: Job, operator: str) -> bpy.t
 def draw_doubts(
     layout: bpy.types.UILayout, smoke: bpy.types.Object, doubts: Iterable[tuple[str, str]], said: set[str]
 ) -> None:
-    """Why a result may be wrong, what is left to do about it, and the button that does it.
+    """Why a result may be wrong (kinds and words), what is left to do about it, and the button that does it.
 
-    A doubt is a kind and words. Kinds that are ``said`` elsewhere in the tab are left out, and these are added to
-    them.
+    Kinds that are ``said`` elsewhere in the tab are left out, and these are added to them.
     """
     settings = smoke.smokelift
     given = {

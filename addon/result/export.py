@@ -89,10 +89,7 @@ def write_asset(smoke: bpy.types.Object, folder: Path) -> None:
 
 
 def copy_of(obj: bpy.types.Object, offset: int = 0, repeat: bool = False) -> bpy.types.Object:
-    """A copy of a Volume object, with data of its own and the same material, which is no smoke to be made.
-
-    It plays some frames later, and again and again if it repeats or the original does.
-    """
+    """A copy of a Volume object, no smoke itself, which plays some frames later, and again and again if it repeats."""
     copy = bpy.data.objects.new(obj.name, obj.data.copy())
     copy.delta_location = obj.delta_location  # first: the matrix has it, and gives the rest to the location
     copy.matrix_basis = obj.matrix_basis

@@ -19,8 +19,7 @@ from .smoke_takes import Run, engine_job, runs, show_while_made
 def enqueue(smoke: bpy.types.Object, take: Take, settings: str = "") -> None:
     """Append a take to the queue; without a window, wait for its end. ShotError if it cannot be made.
 
-    The settings are those that it is made with, as `shot_check.settings_text` has them; empty if they are not the
-    smoke's own.
+    It is made with settings as `shot_check.settings_text` has them; empty if they are not the smoke's own.
     """
     try:
         job = engine_job(smoke, take)

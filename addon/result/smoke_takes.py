@@ -44,10 +44,7 @@ runs: list[Run] = []  # the runs of this session, in the order of the queue
 
 
 def output_folder(smoke: bpy.types.Object) -> Path:
-    """The folder of a smoke's takes: the chosen one, else the one that it has, else a new one.
-
-    A new one is in that of the preferences, beside the .blend or beside the clip.
-    """
+    """The folder of a smoke's takes: the chosen one, its own, or one in that of the preferences, .blend or clip."""
     settings = smoke.smokelift
     if folder := settings.output or settings.results:
         return absolute(folder)
@@ -59,10 +56,7 @@ def output_folder(smoke: bpy.types.Object) -> Path:
 
 
 def own_takes(smoke: bpy.types.Object) -> list[Take]:
-    """The takes in a smoke's folder that belong to this file, oldest first.
-
-    Those are what it shows, what was made or shown in it, and what no file is known of that is there.
-    """
+    """The takes in a smoke's folder that this file shows or made, or that no file is known of; the oldest first."""
     here, shown, before = _names_of_file(smoke), volume.directories_on_show(), volume.take_before(smoke)
 
     def belongs(take: Take) -> bool:
@@ -118,10 +112,7 @@ def write_directed(smoke: bpy.types.Object) -> Take:
 
 
 def _next_take(smoke: bpy.types.Object) -> Take:
-    """The take with the next free number, in a folder that the smoke keeps from now on.
-
-    It takes the place of runs that ended before their first frame.
-    """
+    """The next free take, in a folder that the smoke keeps; it takes the place of runs that ended without a frame."""
     separate_duplicate(smoke)
     folder, in_use = output_folder(smoke), directories_in_use()
     for take in own_takes(smoke):

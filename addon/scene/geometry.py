@@ -154,10 +154,7 @@ def new_box() -> bpy.types.Object:
 def camera_table(
     smoke: bpy.types.Object, camera: bpy.types.Object, depsgraph: bpy.types.Depsgraph, rotation: Matrix
 ) -> dict[str, Any]:
-    """The camera as a pinhole (or orthographic) camera of the clip's size, as it is evaluated in a frame.
-
-    The rotation (3x3) is from the engine's axes to Blender's.
-    """
+    """The evaluated camera as one of the clip's size; the rotation (3x3) is from the engine's axes to Blender's."""
     width, height = smoke.smokelift.clip.size
     render = scene_of(smoke).render
     if camera.data.type not in ("PERSP", "ORTHO"):

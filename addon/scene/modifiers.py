@@ -140,10 +140,7 @@ def fit_interpolation(smoke: bpy.types.Object, wanted: bool) -> None:
 
 
 def drive_interpolation(smoke: bpy.types.Object, place: str, seconds: float) -> None:
-    """Say where in the take a smoke is in a frame of the scene, if it has frames between.
-
-    The place, in frames, is an expression for a driver. From one frame to the next it is so many seconds.
-    """
+    """Drive frames between by the place in the take, an expression in frames, of which each lasts so many seconds."""
     modifier = FRAMES_BETWEEN.modifier(smoke)
     if modifier is None:
         return

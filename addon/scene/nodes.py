@@ -66,10 +66,9 @@ def compositor(scene: bpy.types.Scene) -> tuple[Tree, Socket]:
 def file_group(
     name: str, kind: str, mark: str, inputs: Sequence[Input], outputs: Mapping[str, str], build: Callable[[Tree], None]
 ) -> Tree:
-    """The file's own node group, which the artist may have changed, or else a new one, whose nodes ``build`` adds.
+    """The file's own node group of a mark, its custom property, or else a new one, whose nodes ``build`` adds.
 
-    The kind is that of its tree. The mark is the custom property by which it is found under any name. Outputs are
-    names and types.
+    The kind is that of its tree; outputs are names and types.
     """
     for group in bpy.data.node_groups:
         if group.library is None and group.get(mark):

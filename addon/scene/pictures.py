@@ -55,10 +55,7 @@ def picture_scene(clip: bpy.types.MovieClip) -> Iterator[tuple[bpy.types.Scene, 
 
 
 def write_pictures(clip: bpy.types.MovieClip, first: int, last: int, prefix: Path, undistort: bool = False) -> Path:
-    """Write what a clip shows in some frames of the scene, as PNG; returns the first picture.
-
-    Blender adds the frame and the suffix to the prefix. RuntimeError if they cannot be written.
-    """
+    """Write frames of a clip as PNG, numbers after the prefix; returns the first one. RuntimeError if that fails."""
     with picture_scene(clip) as (scene, tree, shown):
         scene.frame_start, scene.frame_end = first, last
         scene.view_settings.view_transform = "Standard"

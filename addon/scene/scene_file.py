@@ -131,10 +131,7 @@ def light_tables(
 
 
 def emitted(light: bpy.types.Light, scale: float = 1.0) -> list[float]:
-    """The strength of a light in red, green and blue, times a number: of a sun its irradiance (W/m^2).
-
-    That of a point light (W), over the sphere's 4 pi, is its intensity (W/sr).
-    """
+    """The strength of a light in RGB, times a number: a sun's irradiance (W/m^2), a point's power (W: 4 pi W/sr)."""
     scale *= light.energy * 2.0 ** getattr(light, "exposure", 0.0)  # older versions of Blender lack it, and temperature
     warmth = light.temperature_color if getattr(light, "use_temperature", False) else (1.0, 1.0, 1.0)
     return [scale * a * b for a, b in zip(light.color, warmth, strict=True)]
