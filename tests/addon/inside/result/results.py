@@ -86,8 +86,12 @@ def test_what_another_file_may_show_stays_and_each_file_has_its_own(project) -> 
 
     bpy.ops.wm.open_mainfile(filepath=str(folder / "shot.blend"))
     assert (own(), doomed()) == ([1, 2], [])
+    smoke(bpy.context.scene).smokelift.mask = "//mask.png"
     bpy.ops.wm.save_as_mainfile(filepath=str(project / "copy.blend"), copy=True)
     assert "copy.blend" in smoke_takes.consequences(bpy.context, first)[0]
+    bpy.ops.wm.open_mainfile(filepath=str(project / "copy.blend"))
+    assert absolute(smoke(bpy.context.scene).smokelift.mask) == folder / "mask.png"
+    assert own() == [1, 2]
 
     shutil.copy(folder / "second.blend", folder / "by hand.blend")
     bpy.ops.wm.open_mainfile(filepath=str(folder / "by hand.blend"))
