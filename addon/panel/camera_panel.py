@@ -1,10 +1,10 @@
 """Camera, box and light in the tab; and the button that asks where the smoke stands."""
 
 import bpy
-from bpy.app.translations import pgettext_rpt as rpt_
 from bpy_extras import view3d_utils
 
 from ..core import ShotError
+from ..scene.blender import rpt_
 from ..scene.geometry import Floor, box_of, framed_box, has_inlet, new_box
 from ..scene.plate import show_clip_behind
 from ..scene.smoke import active_smoke, scene_of

@@ -3,7 +3,6 @@
 from typing import Any
 
 import bpy
-from bpy.app.translations import pgettext_iface as iface_
 
 from ..core.contract import FASTEST, SLOWEST
 from ..result import run_queue, smoke_takes
@@ -11,7 +10,7 @@ from ..result.directing import MESHES, frames_of_result
 from ..result.export import arguments, copy_of, folder_of, size_estimate, write_asset
 from ..result.side_job import write_files, writing_job
 from ..scene import volume
-from ..scene.blender import PATH_OPTIONS
+from ..scene.blender import PATH_OPTIONS, iface_
 from ..scene.modifiers import CAN_INTERPOLATE
 from ..scene.smoke import activate
 from ..scene.volume import synchronize_playback

@@ -7,12 +7,12 @@ painted in the Image Editor, whose sidebar has their colors.
 from pathlib import Path
 
 import bpy
-from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..core import ShotError
 from ..core.take import Take
 from ..result import smoke_takes
 from ..result.side_job import write_files
+from ..scene.blender import rpt_
 from ..scene.clip import lay_below, number_in_file, saved_strokes, shown_frame, strokes_at
 from ..scene.pictures import write_pictures
 from ..scene.scene_file import footage_tables

@@ -5,12 +5,12 @@ from collections.abc import Iterable
 from typing import Any
 
 import bpy
-from bpy.app.translations import pgettext_iface as iface_
 
 from ..core.contract import MOVING_CAMERA
 from ..core.job import Job
 from ..core.sentences import REMEDIES, advice, duration, repeats
 from ..result.side_job import writing_job
+from ..scene.blender import iface_
 
 POINTS_PER_LETTER = 6.5  # mean width of a letter in Blender's interface font at scale 1; Blender does not wrap labels
 NEW_WIDTH = 258  # points of the sidebar in a new window; those of a sidebar that is not drawn

@@ -1,11 +1,11 @@
 """The sub-panels Advanced, Look and Shot Set-Up: how a result plays, what it looks like, and the scene around it."""
 
 import bpy
-from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..core import ShotError
 from ..result.shot_check import found_lines, state
 from ..scene import look, shot_setup, volume
+from ..scene.blender import rpt_
 from ..scene.modifiers import CAN_INTERPOLATE, PROXY, in_viewport
 from ..scene.plate import clip_behind
 from ..scene.smoke import is_override, smoke_with_look

@@ -1,11 +1,11 @@
 """The qualities in the tab, with what each takes and loses."""
 
 import bpy
-from bpy.app.translations import pgettext_iface as iface_
 
 from ..core.contract import BOX_VOXELS
 from ..core.sentences import duration
 from ..result import shot_check
+from ..scene.blender import iface_
 from .common import needs_clip, operator
 from .layout import draw_doubts, draw_failure, draw_text
 from .settings import automatic_unless, choice, number, whole

@@ -4,14 +4,13 @@ Its buttons make smoke and stop that; below them is the queue.
 """
 
 import bpy
-from bpy.app.translations import pgettext_iface as iface_
-from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..core import ShotError
 from ..result import run_queue, smoke_takes
 from ..result.shot_check import settings_text
 from ..result.smoke_takes import Run, runs
 from ..scene import volume
+from ..scene.blender import iface_, rpt_
 from ..scene.modifiers import lacks_proxy
 from ..scene.smoke import activate, find_smoke, smokes
 from .camera_panel import draw_shot

@@ -10,14 +10,13 @@ from pathlib import Path
 from typing import Any
 
 import bpy
-from bpy.app.translations import pgettext_iface as iface_
 
 from ..core import ShotError
 from ..core.contract import ASSET_FILE, EXPORT_FILE, FRAME_FILE
 from ..core.job import Job
 from ..core.sentences import disk_size
 from ..scene import volume
-from ..scene.blender import absolute, call_later, file_of, relative
+from ..scene.blender import absolute, call_later, file_of, iface_, relative
 from ..scene.look import fit_look
 from ..scene.smoke import find_smoke
 from . import smoke_takes

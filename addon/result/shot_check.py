@@ -12,12 +12,11 @@ from pathlib import Path
 from typing import Any
 
 import bpy
-from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..core import ShotError
 from ..core.job import Job
 from ..core.take import Take
-from ..scene.blender import call_later, cancel_call, redraw, thread_options
+from ..scene.blender import call_later, cancel_call, redraw, rpt_, thread_options
 from ..scene.geometry import box_corners, box_of
 from ..scene.scene_file import options, shot_files, shot_tables
 from ..scene.smoke import active_smoke, find_smoke, scene_of, smokes

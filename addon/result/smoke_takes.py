@@ -8,13 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
-from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..core import ShotError
 from ..core.job import Job, engine_command
 from ..core.take import Take, new_take, takes
 from ..scene import shot_setup, volume
-from ..scene.blender import absolute, file_of, preferred, relative, thread_options
+from ..scene.blender import absolute, file_of, preferred, relative, rpt_, thread_options
 from ..scene.scene_file import options as engine_options
 from ..scene.scene_file import shot_files, shot_tables
 from ..scene.smoke import active_smoke, hide_default_cube, is_smoke, scene_of, separate_duplicate, smokes

@@ -11,6 +11,8 @@ from typing import Any
 import bpy
 import numpy as np
 from bpy.app.handlers import persistent
+from bpy.app.translations import pgettext_iface as iface_  # noqa: F401 - from here for all, as rpt_ is
+from bpy.app.translations import pgettext_rpt as rpt_  # noqa: F401
 
 PACKAGE = __package__.rpartition(".")[0]  # the add-on's name, under which Blender keeps its preferences
 

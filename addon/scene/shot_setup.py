@@ -7,11 +7,10 @@ import math
 from typing import Any
 
 import bpy
-from bpy.app.translations import pgettext_rpt as rpt_
 from mathutils import Matrix, Vector
 
 from . import volume
-from .blender import set_unless_changed
+from .blender import rpt_, set_unless_changed
 from .clip import used_range
 from .compositing import composite, disable_composite
 from .nodes import add_node

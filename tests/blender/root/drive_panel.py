@@ -11,23 +11,8 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d
 from mathutils import Vector
 
 sys.path.insert(0, str(Path(__file__).parent))
-from artist import (
-    checked,
-    click,
-    find,
-    first_window,
-    largest_area,
-    look_away,
-    perform,
-    picture,
-    place,
-    region,
-    report,
-    runs,
-    shell,
-    take,
-    until,
-)
+import artist
+from artist import click, find, look_away, picture, place, region, report, runs, shell, until
 
 TICK_SECONDS = 0.02
 DRAWINGS = 5
@@ -41,7 +26,7 @@ SUB_PANELS = ("results", "advanced", "look", "set_up", "direct", "export")
 
 
 def story() -> Iterator[float]:
-    window, area = first_window(), largest_area("VIEW_3D")
+    window, area = artist.first_window(), artist.largest_area("VIEW_3D")
     space = area.spaces.active
     space.region_3d.view_perspective = "CAMERA"
     space.shading.type = "SOLID"
@@ -91,7 +76,7 @@ def qualities(window: bpy.types.Window, area: bpy.types.Area) -> Iterator[float]
     chosen, settings.longest_side = settings.longest_side, 0
     region(area, "UI").active_panel_category = "Smokelift"
     area.tag_redraw()
-    yield from until(checked)
+    yield from until(artist.checked)
     yield 1.0
     yield from picture("qualities")
     settings.longest_side = chosen
@@ -115,7 +100,7 @@ def stands(window: bpy.types.Window, area: bpy.types.Area) -> Iterator[float]:
     click()
     yield 1.0
     known, settings.distance = settings.distance, 0.0
-    yield from until(checked)
+    yield from until(artist.checked)
     return known
 
 
@@ -158,7 +143,7 @@ def make_smoke(window: bpy.types.Window, area: bpy.types.Area, name: str, comman
     yield from picture(f"{name}_closed")
     sidebar.active_panel_category = "Smokelift"
     area.tag_redraw()
-    yield from until(checked)  # the engine looks at the shot and says what it will take
+    yield from until(artist.checked)  # the engine looks at the shot and says what it will take
     yield 1.0
     yield from picture(f"{name}_idle")
     yield from find(window, area, sidebar, command)
@@ -183,7 +168,7 @@ def make_smoke(window: bpy.types.Window, area: bpy.types.Area, name: str, comman
             seen["progress"].append(job.done)
             seen["playhead"].append(window.scene.frame_current)
             if not half_way and job.done >= job.total // 2 > 0:
-                half_way = shell(take(f"{name}_running"))
+                half_way = shell(artist.take(f"{name}_running"))
         yield 0.05
     seen["seconds"] = round(time.monotonic() - clicked, 2)
     bpy.app.timers.unregister(tick)
@@ -213,4 +198,4 @@ def note_smoke(scene: bpy.types.Scene, drawn: list[float]) -> None:
         drawn.append(time.monotonic())
 
 
-perform(story)
+artist.perform(story)

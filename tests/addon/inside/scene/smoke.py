@@ -119,7 +119,6 @@ def test_results_are_picked_named_and_deleted(shot, tmp_path) -> None:
         made(tmp_path / "out", number=number)
     assert bpy.ops.smokelift.show_take(take=str(first.directory)) == {"FINISHED"}
     assert volume.shown_take(smoke(shot)) == first
-    assert first.read().title == "Take 1"
     assert bpy.ops.smokelift.name_take(take=str(first.directory), title="Slow and thick") == {"FINISHED"}
     assert Take(first.directory).read().title == "Slow and thick"
     assert first.arguments()[0] == "reconstruct"
@@ -127,8 +126,6 @@ def test_results_are_picked_named_and_deleted(shot, tmp_path) -> None:
         bpy.ops.smokelift.remove_take(take=str(first.directory))
     assert bpy.ops.smokelift.remove_take(take=str(second.directory)) == {"FINISHED"}
     assert takes(tmp_path / "out") == [first]
-    size = sum(file.stat().st_size for file in first.directory.iterdir())
-    assert first.size() == pytest.approx(size / 1e6)
     with pytest.raises(RuntimeError, match="no finished frame"):
         bpy.ops.smokelift.show_take(take=str(second.directory))
 
