@@ -151,12 +151,14 @@ def new_box() -> bpy.types.Object:
     return box
 
 
-def camera_table(
-    smoke: bpy.types.Object, camera: bpy.types.Object, depsgraph: bpy.types.Depsgraph, rotation: Matrix
-) -> dict[str, Any]:
-    """The evaluated camera as one of the clip's size; the rotation (3x3) is from the engine's axes to Blender's."""
-    width, height = smoke.smokelift.clip.size
-    render = scene_of(smoke).render
+def camera_table(smoke: bpy.types.Object, depsgraph: bpy.types.Depsgraph, rotation: Matrix) -> dict[str, Any]:
+    """The scene's camera, evaluated, at the clip's size; the rotation (3x3) is from the engine's axes to Blender's."""
+    (width, height), scene = smoke.smokelift.clip.size, scene_of(smoke)
+    if scene.camera is None:
+        raise ShotError(
+            "The scene has no camera: add one where the clip was filmed from, or choose Camera From the Clip."
+        )
+    camera, render = scene.camera.evaluated_get(depsgraph), scene.render
     if camera.data.type not in ("PERSP", "ORTHO"):
         raise ShotError("The camera is panoramic: choose Perspective or Orthographic in its lens settings.")
     if not math.isclose(render.resolution_x * height, render.resolution_y * width, rel_tol=0.005):
@@ -184,15 +186,6 @@ def camera_table(
         "cy": (1 - off_y) * height / 2,
         "size": [width, height],
     }
-
-
-def scene_camera(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> bpy.types.Object:
-    """The scene's camera as it is evaluated; ShotError if there is none."""
-    if scene.camera is None:
-        raise ShotError(
-            "The scene has no camera: add one where the clip was filmed from, or choose Camera From the Clip."
-        )
-    return scene.camera.evaluated_get(depsgraph)
 
 
 def camera_over_frames(smoke: bpy.types.Object, rotation: Matrix, corners: list[Vector], quick: bool) -> dict[str, Any]:
@@ -232,8 +225,8 @@ def _sample_camera(
         for frame in frames:
             if frame != scene.frame_current:
                 scene.frame_set(frame)
-            camera = scene_camera(scene, depsgraph)
-            samples.append((camera_table(smoke, camera, depsgraph, rotation), _in_picture(scene, camera, corners)))
+            table, camera = camera_table(smoke, depsgraph, rotation), scene.camera.evaluated_get(depsgraph)
+            samples.append((table, _in_picture(scene, camera, corners)))
     return samples
 
 
@@ -267,7 +260,7 @@ class Floor:
         box, scene = box_of(smoke), scene_of(smoke)
         rotation = box.matrix_world.to_quaternion().to_matrix()
         with at_frame(scene, start_frame(smoke.smokelift)) as depsgraph:
-            pose = Matrix(camera_table(smoke, scene_camera(scene, depsgraph), depsgraph, rotation)["matrix"])
+            pose = Matrix(camera_table(smoke, depsgraph, rotation)["matrix"])
         up, back = Vector((0.0, 0.0, 1.0)), pose.col[2].to_3d()
         if abs(back.z) > math.sqrt(0.5):  # as the engine takes a camera that looks steeply up or down
             up = pose.col[1].to_3d()
