@@ -58,16 +58,6 @@ class SmokeliftSettings(
     )
 
 
-def register() -> None:
-    bpy.types.Object.smokelift = PointerProperty(type=SmokeliftSettings)
-    bpy.types.Object.smokelift_export = PointerProperty(type=SmokeliftExport)
-
-
-def unregister() -> None:
-    del bpy.types.Object.smokelift_export
-    del bpy.types.Object.smokelift
-
-
 class SmokeliftPreferences(bpy.types.AddonPreferences):
     """The preferences and their page."""
 
@@ -138,3 +128,13 @@ class SMOKELIFT_FH_video(bpy.types.FileHandler):
     @classmethod
     def poll_drop(cls, context: bpy.types.Context) -> bool:
         return context.area is not None and context.area.type in ("VIEW_3D", "CLIP_EDITOR")
+
+
+def register() -> None:
+    bpy.types.Object.smokelift = PointerProperty(type=SmokeliftSettings)
+    bpy.types.Object.smokelift_export = PointerProperty(type=SmokeliftExport)
+
+
+def unregister() -> None:
+    del bpy.types.Object.smokelift_export
+    del bpy.types.Object.smokelift

@@ -50,7 +50,7 @@ def _draw_tab(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy
     layout.prop(settings, "detail")
     draw_settings(layout, settings, "seed", active=settings.detail > 0.0)
     layout.prop(settings, "output", placeholder=str(smoke_takes.output_folder(smoke)))
-    draw_run(layout, context, smoke)
+    _draw_runs(layout, context, smoke)
 
 
 @operator("Make Smoke", needs_clip, bl_options={"UNDO"})
@@ -88,7 +88,7 @@ def resume(_context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     run_queue.enqueue(smoke, take)
 
 
-def draw_run(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
+def _draw_runs(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     """The buttons, whose places do not change; below them the warnings, the runs, and what is known of the result."""
     own = [run for run in runs if run.smoke == smoke.session_uid]
     idle, now = all(run.job.ended for run in own), volume.shown(smoke)
@@ -107,7 +107,7 @@ def draw_run(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.
     draw_check(layout, smoke, {job.sentence for job in jobs} | {kind for job in jobs for kind, _ in job.doubts})
     said: set[str] = set()
     for run in runs:
-        _draw_run(layout, smoke, run, said)
+        _draw_one(layout, smoke, run, said)
     if begun is not None:
         frames, title = begun.read().frames, begun.read().title
         if all(run.take != begun for run in own):  # the end of another session interrupted it
@@ -131,7 +131,7 @@ def draw_run(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.
         layout.operator("smokelift.choose_results", icon="FILE_FOLDER")
 
 
-def _draw_run(layout: bpy.types.UILayout, shown: bpy.types.Object, run: Run, said: set[str]) -> None:
+def _draw_one(layout: bpy.types.UILayout, shown: bpy.types.Object, run: Run, said: set[str]) -> None:
     """A run, also of another smoke; that one's warnings stand in its own tab. Doubts that are ``said`` stand above."""
     box, job, own = layout.box(), run.job, run.smoke == shown.session_uid
     smoke, name = find_smoke(run.smoke), str(run.take.directory)

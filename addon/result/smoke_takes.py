@@ -67,7 +67,7 @@ def own_takes(smoke: bpy.types.Object) -> list[Take]:
     return [take for take in takes(output_folder(smoke)) if belongs(take)]
 
 
-def foreign_files(smoke: bpy.types.Object, take: Take) -> list[Path] | None:
+def _foreign_files(smoke: bpy.types.Object, take: Take) -> list[Path] | None:
     """Other .blend files that may show a take; None where that is unknown."""
     files = take.read().files
     return None if files is None else sorted(files - _names_of_file(smoke))
@@ -218,7 +218,7 @@ def earlier_takes(context: bpy.types.Context) -> list[Take]:
     own, shown, in_use = own_takes(smoke), volume.shown_take(smoke), directories_in_use()
     earlier = own[: own.index(shown)] if shown in own else []
     removable = [
-        take for take in earlier if take.directory.resolve() not in in_use and foreign_files(smoke, take) == []
+        take for take in earlier if take.directory.resolve() not in in_use and _foreign_files(smoke, take) == []
     ]
     while True:  # what is made of a result that goes needs nothing
         needed = {source for take in _known_takes() if take not in removable and (source := take.read().source)}
@@ -233,7 +233,7 @@ def consequences(context: bpy.types.Context, take: Take) -> list[str]:
     made = [other.read().title for other in _known_takes() if other.read().source == take]
     if made:
         said.append(rpt_("Made of it: {:s}.").format(", ".join(made)))
-    files = foreign_files(active_smoke(context.scene), take)
+    files = _foreign_files(active_smoke(context.scene), take)
     if files is None:
         said.append(rpt_("An earlier version of Smokelift made it: other files may show it."))
     elif files:

@@ -75,14 +75,14 @@ def shown_frame(smoke: bpy.types.Object) -> int:
     return now - start + 1
 
 
-def sequence_of(clip: bpy.types.MovieClip) -> ImageSequence | None:
+def _sequence_of(clip: bpy.types.MovieClip) -> ImageSequence | None:
     """The pictures of a clip, also those after a gap, at which it ends for Blender; None of a video."""
     return image_sequence_from(file_of(clip)) if clip.source == "SEQUENCE" else None
 
 
 def unseen_pictures(settings: bpy.types.PropertyGroup) -> ImageSequence | None:
     """The pictures of a smoke's clip where it is used to its end for Blender or beyond, and there is a gap or more."""
-    found, known = sequence_of(settings.clip), settings.clip.frame_duration
+    found, known = _sequence_of(settings.clip), settings.clip.frame_duration
     if found is None or settings.last < known or (found.count <= known and not found.missing):
         return None
     return found
@@ -95,7 +95,7 @@ def frame_count(clip: bpy.types.MovieClip) -> int:
         raise ShotError(f"The clip {path} is not there: choose it again, or use File > External Data.")
     if clip.frame_duration < 1:  # Blender takes any file for a clip
         raise ShotError(f"The clip {path} is no video and no picture that Blender can read: choose another.")
-    found = sequence_of(clip)
+    found = _sequence_of(clip)
     return clip.frame_duration if found is None else max(clip.frame_duration, found.count)
 
 
@@ -161,7 +161,7 @@ def saved_strokes(image: bpy.types.Image, clip: bpy.types.MovieClip) -> Path:
             if image.is_dirty or image[WRITTEN] != _time(file):
                 if image.is_dirty:
                     image.save()  # or Blender asks for it at its end
-                _save(strokes_in(_pixels(image)), tuple(image.size), file)
+                _save(_strokes_in(_pixels(image)), tuple(image.size), file)
                 image[WRITTEN] = _time(file)
         elif image.is_dirty and image.filepath and image.packed_file is None:
             image.save()
@@ -191,7 +191,7 @@ def strokes_at(file: Path, size: tuple[int, int]) -> bpy.types.Image:
 def lay_below(image: bpy.types.Image, picture: Path) -> None:
     """Put a picture of its size below the strokes of an image whose file has them all."""
     filmed = bpy.data.images.load(str(picture))
-    values, strokes = _pixels(filmed), strokes_in(_pixels(image))
+    values, strokes = _pixels(filmed), _strokes_in(_pixels(image))
     bpy.data.images.remove(filmed)
     gray = values[:, :3].mean(1, keepdims=True)
     values[:, :3] = gray + SATURATION * (values[:, :3] - gray)
@@ -202,7 +202,7 @@ def lay_below(image: bpy.types.Image, picture: Path) -> None:
     image[WRITTEN] = _time(absolute(image.filepath))
 
 
-def strokes_in(values: Pixels) -> Pixels:
+def _strokes_in(values: Pixels) -> Pixels:
     """The strokes in an image, in pure colors, and transparent elsewhere."""
     colors = values[:, :3]
     painted = (values[:, 3] > MIN_STROKE) & (np.ptp(colors, axis=1) > MIN_STROKE)

@@ -49,7 +49,7 @@ def box_corners(box: bpy.types.Object) -> list[Vector]:
 
 def domain_table(box: bpy.types.Object, rotation: Matrix, settings: bpy.types.PropertyGroup) -> dict[str, Any]:
     """The domain: the box in cubic voxels, a multiple of four along each side. It grows and keeps its floor."""
-    low, high = sides_of(box, rotation)
+    low, high = _sides_of(box, rotation)
     extent = high - low
     if min(extent) <= 1e-6 * max(*extent, 1e-6):
         raise ShotError("The box is flat: give it a width, a depth and a height.")
@@ -61,7 +61,7 @@ def domain_table(box: bpy.types.Object, rotation: Matrix, settings: bpy.types.Pr
     return {"min": start, "max": [s + length for s, length in zip(start, size, strict=True)], "resolution": counts}
 
 
-def sides_of(box: bpy.types.Object, rotation: Matrix) -> tuple[Vector, Vector]:
+def _sides_of(box: bpy.types.Object, rotation: Matrix) -> tuple[Vector, Vector]:
     """The lowest and the highest corner of a box in the engine's world."""
     corners = [rotation.inverted() @ corner for corner in box_corners(box)]
     low = Vector(min(corner[axis] for corner in corners) for axis in range(3))
@@ -84,7 +84,7 @@ def keep_camera_outside(
     eyes = [Vector(row[3] for row in pose[:3]) for pose in camera.get("matrices") or [camera["matrix"]]]
     if camera["type"] != "perspective" or not any(is_inside(domain["min"], domain["max"], eye) for eye in eyes):
         return domain
-    low, high = sides_of(box, rotation)
+    low, high = _sides_of(box, rotation)
     rounding = ROUNDING * max(high - low)
     if any(is_inside(low, high, eye, rounding) for eye in eyes):
         raise ShotError("The camera stands inside the smoke's box: move it out, or make the box smaller.")
@@ -151,7 +151,7 @@ def new_box() -> bpy.types.Object:
     return box
 
 
-def camera_table(smoke: bpy.types.Object, depsgraph: bpy.types.Depsgraph, rotation: Matrix) -> dict[str, Any]:
+def _camera_table(smoke: bpy.types.Object, depsgraph: bpy.types.Depsgraph, rotation: Matrix) -> dict[str, Any]:
     """The scene's camera, evaluated, at the clip's size; the rotation (3x3) is from the engine's axes to Blender's."""
     (width, height), scene = smoke.smokelift.clip.size, scene_of(smoke)
     if scene.camera is None:
@@ -225,7 +225,7 @@ def _sample_camera(
         for frame in frames:
             if frame != scene.frame_current:
                 scene.frame_set(frame)
-            table, camera = camera_table(smoke, depsgraph, rotation), scene.camera.evaluated_get(depsgraph)
+            table, camera = _camera_table(smoke, depsgraph, rotation), scene.camera.evaluated_get(depsgraph)
             samples.append((table, _in_picture(scene, camera, corners)))
     return samples
 
@@ -260,12 +260,12 @@ class Floor:
         box, scene = box_of(smoke), scene_of(smoke)
         rotation = box.matrix_world.to_quaternion().to_matrix()
         with at_frame(scene, start_frame(smoke.smokelift)) as depsgraph:
-            pose = Matrix(camera_table(smoke, depsgraph, rotation)["matrix"])
+            pose = Matrix(_camera_table(smoke, depsgraph, rotation)["matrix"])
         up, back = Vector((0.0, 0.0, 1.0)), pose.col[2].to_3d()
         if abs(back.z) > math.sqrt(0.5):  # as the engine takes a camera that looks steeply up or down
             up = pose.col[1].to_3d()
         along = (back.dot(up) * up - back).normalized()
-        return cls(rotation, *sides_of(box, rotation), pose.translation, along)
+        return cls(rotation, *_sides_of(box, rotation), pose.translation, along)
 
     def clicked(self, rays: Sequence[tuple[Vector, Vector]]) -> float:
         """The level distance, straight ahead, of where the first of two rays of neighboring pixels meets the floor.

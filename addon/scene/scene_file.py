@@ -75,7 +75,7 @@ def shot_tables(smoke: bpy.types.Object, quick: bool = False) -> dict[str, Any]:
         if settings.use_medium:
             tables["medium"] = {key: getattr(settings, key) for key in ("extinction", "albedo", "anisotropy")}
         if settings.light_mode == "SCENE":
-            tables["lights"] = light_tables(scene, depsgraph, rotation, tables.get("domain"))
+            tables["lights"] = _light_tables(scene, depsgraph, rotation, tables.get("domain"))
         if settings.closed:
             tables.setdefault("domain", {})["closed"] = [side for side in SIDES if side in settings.closed]
     if "image" in tables.get("background", {}) and "matrices" in tables.get("camera", {}):
@@ -100,7 +100,7 @@ def options(smoke: bpy.types.Object) -> list[str]:
     return words
 
 
-def light_tables(
+def _light_tables(
     scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, rotation: Matrix, domain: dict[str, Any] | None
 ) -> list[dict[str, Any]]:
     """The scene's suns and point lights, which stand outside the domain, and the picture that lights its world."""

@@ -16,15 +16,8 @@ MODULE = "bl_ext.user_default.smokelift"
 
 
 def story() -> Iterator[float]:
-    yield from undo()
-    yield from rename()
-    yield from delete()
-    yield from save_elsewhere()
-    yield from stop_with_the_keyboard()
-    yield from queue()
-    yield from fail()
-    yield from disable()
-    yield from close()
+    for chapter in (undo, rename, delete, save_elsewhere, stop_with_the_keyboard, queue, fail, disable, close):
+        yield from chapter()
 
 
 def scene() -> bpy.types.Scene:
