@@ -188,7 +188,10 @@ class Snapshot:
     options: list[str] | None  # the engine's further options; None where the request is missing or damaged
     title: str  # the name that the artist gave it, or its number
     index: dict[str, Any]  # `sequence.json`, not to be changed; empty before there is one, or of a foreign one
+    scene: Any  # the tables of its scene as the engine completed them; None without an index
     numbers: list[int]  # those of the finished frames
+    file_numbers: list[int]  # those in the names of their files; the engine of earlier versions counts from 1
+    complete: bool  # whether all frames are finished
     resumable: bool  # whether the run can go on: it started and is not complete
     files: frozenset[Path] | None  # .blend files, without links, that may show it; None where a list was never kept
 
@@ -196,21 +199,6 @@ class Snapshot:
     def frames(self) -> int:
         """Number of finished frames."""
         return len(self.numbers)
-
-    @property
-    def file_numbers(self) -> list[int]:
-        """The numbers in the names of their files; the engine of earlier versions counts from 1."""
-        return [number + self.index.get("start_number", 1) - 1 for number in self.numbers]
-
-    @property
-    def scene(self) -> Any:
-        """The tables of its scene as the engine completed them, where there is an index."""
-        return self.index["scene"]
-
-    @property
-    def complete(self) -> bool:
-        """Whether all frames are finished."""
-        return bool(self.index.get("complete"))
 
 
 FileState = tuple[int, int, int] | None  # time, number and size, by which a change is seen; None of a missing file
@@ -240,14 +228,18 @@ def _snapshot_at(take: Take, request_state: FileState, _index_state: FileState, 
         options = None
     begun = request_state is not None and (direction is not None or scene_state is not None)
     number, files = take.directory.name.rpartition("_")[2].lstrip("0"), request.get("files")
+    numbers, complete = sorted(map(int, index.get("frames", ()))), bool(index.get("complete"))
     return Snapshot(
         direction=direction,
         source=source,
         options=None if options is None else [str(word) for word in options],
         title=str(request.get("title", "")) or f"{TITLES.get(direction or '', 'Take')} {number}",
         index=index,
-        numbers=sorted(map(int, index["frames"])) if index else [],
-        resumable=begun and not index.get("complete"),
+        scene=index.get("scene"),
+        numbers=numbers,
+        file_numbers=[number + index.get("start_number", 1) - 1 for number in numbers],
+        complete=complete,
+        resumable=begun and not complete,
         files=frozenset((folder / str(file)).resolve() for file in files) if isinstance(files, list) else None,
     )
 
