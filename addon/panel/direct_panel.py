@@ -7,7 +7,7 @@ import bpy
 from ..core.contract import FASTEST, SLOWEST
 from ..result import run_queue, smoke_takes
 from ..result.directing import MESHES, frames_of_result
-from ..result.export import arguments, copy_of, folder_of, size_estimate, write_asset
+from ..result.export import arguments, copy_of, export_size, folder_of, write_asset
 from ..result.side_job import write_files, writing_job
 from ..scene import volume
 from ..scene.blender import PATH_OPTIONS, iface_
@@ -226,7 +226,7 @@ def _draw_export(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: 
     settings = smoke.smokelift_export
     layout.prop(settings, "folder", placeholder=str(folder_of(smoke)))
     draw_settings(layout, settings, "host", "precision", "use_velocity", "proxy")
-    draw_text(layout, size_estimate.size(smoke), "DISK_DRIVE")
+    draw_text(layout, export_size(smoke), "DISK_DRIVE")
     draw_work(layout, smoke, "smokelift.export", "EXPORT")
     layout.operator("smokelift.add_instance", icon="DUPLICATE")
 

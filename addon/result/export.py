@@ -22,39 +22,36 @@ from ..scene.smoke import find_smoke
 from . import smoke_takes
 from .side_job import REST_SECONDS, writing_job
 
+_size: dict[tuple[Any, ...], str] = {}
+"""The size in words of the next export, by the number of its smoke and what else decides it; never saved."""
 
-class SizeEstimate:
-    """The size of the next export of a smoke; never saved."""
 
-    def __init__(self) -> None:
-        self._of: tuple[Any, ...] = (0,)  # number of the smoke, and what else decides the size
-        self._size = ""
-        self._timer = self._start  # Blender knows a timer by the object, and each `self._start` is another
+def export_size(smoke: bpy.types.Object) -> str:
+    """The size in words; empty until the engine has said it, which is asked once. Drawing code may call this."""
+    now = (smoke.session_uid, *arguments(smoke), volume.shown_take(smoke).read().frames)
+    if now not in _size and not writing_job.writing:
+        _size.clear()
+        _size[now] = ""
+        call_later(_ask_size, REST_SECONDS)
+    return _size.get(now, "")
 
-    def size(self, smoke: bpy.types.Object) -> str:
-        """The size in words; empty until the engine has said it, which is asked once. Drawing code may call this."""
-        now = (smoke.session_uid, *arguments(smoke), volume.shown_take(smoke).read().frames)
-        if self._of != now and not writing_job.writing:
-            self._of, self._size = now, ""
-            call_later(self._timer, REST_SECONDS)
-        return self._size if self._of == now else ""
 
-    def _start(self) -> None:
-        """Ask the engine once the settings rest."""
-        smoke = find_smoke(self._of[0])
-        if smoke is None or writing_job.writing or volume.shown_take(smoke) is None:
-            return
-        try:
-            writing_job.start(smoke, [*arguments(smoke), "--size"], self._store)
-        except ShotError as error:
-            self._size = str(error)
+def _ask_size() -> None:
+    """Ask the engine once the settings rest."""
+    (asked,) = _size
+    smoke = find_smoke(asked[0])
+    if smoke is None or writing_job.writing or volume.shown_take(smoke) is None:
+        return
 
-    def _store(self, _smoke: bpy.types.Object, job: Job) -> None:
+    def store(_smoke: bpy.types.Object, job: Job) -> None:
         done = job.outcome == "done"
-        self._size = iface_("About {:s}").format(disk_size(job.details["size"] / 1e6)) if done else job.sentence
+        if asked in _size:  # else the settings have changed meanwhile
+            _size[asked] = iface_("About {:s}").format(disk_size(job.details["size"] / 1e6)) if done else job.sentence
 
-
-size_estimate = SizeEstimate()
+    try:
+        writing_job.start(smoke, [*arguments(smoke), "--size"], store)
+    except ShotError as error:
+        _size[asked] = str(error)
 
 
 def folder_of(smoke: bpy.types.Object) -> Path:
