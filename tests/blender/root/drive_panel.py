@@ -22,6 +22,9 @@ EYEDROPPER = 0.85
 BASE = Vector((-0.2, 0.4, 0.0))
 """On the floor of the box, 7.4 m from the camera."""
 
+ALONE = ("bl_space_type", "bl_region_type", "bl_category", "bl_label", "needs", "draw")
+"""What a sub-panel has beside its parent."""
+
 SUB_PANELS = ("results", "advanced", "look", "set_up", "direct", "export")
 
 
@@ -113,18 +116,8 @@ def sub_panels(window: bpy.types.Window, area: bpy.types.Area) -> Iterator[float
     yield 1.0
     for name in SUB_PANELS:
         of_smoke = getattr(bpy.types, f"SMOKELIFT_PT_view_{name}")
-        alone = type(
-            f"SMOKELIFT_PT_alone_{name}",
-            of_smoke.__bases__,
-            {
-                "bl_space_type": "VIEW_3D",
-                "bl_region_type": "UI",
-                "bl_category": "Smokelift",
-                "bl_label": of_smoke.bl_label,
-                "needs": of_smoke.needs,
-                "draw": of_smoke.draw,
-            },
-        )
+        own = {key: getattr(of_smoke, key) for key in ALONE}
+        alone = type(f"SMOKELIFT_PT_alone_{name}", of_smoke.__bases__, own)
         bpy.utils.register_class(alone)
         look_away()
         yield 1.5

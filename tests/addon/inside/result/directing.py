@@ -177,10 +177,8 @@ def test_winds_and_fans(result, acting) -> None:
     for name in ("One", "Two"):
         placed(acting, name, field="WIND", rotation_euler=(0.0, math.pi / 2, 0.0)).field.strength = 0.4
     placed(acting, "Empty", location=(0.1, 0.2, 0.3), empty_display_size=0.25)
-    field = placed(
-        acting, "Force", field="FORCE", location=(0.0, 0.0, 1.0), scale=(2.0, 2.0, 2.0), empty_display_size=0.1
-    )
-    field.field.strength = -2.0
+    large = {"location": (0.0, 0.0, 1.0), "scale": (2.0, 2.0, 2.0), "empty_display_size": 0.1}
+    placed(acting, "Force", field="FORCE", **large).field.strength = -2.0
     gust = placed(acting, "Gust", field="WIND", location=(0.0, 0.5, 1.0)).field
     gust.strength, gust.use_max_distance, gust.distance_max = 3.0, True, 0.3
     result.smokelift.directing.fan_speed = 1.5

@@ -176,9 +176,7 @@ def test_a_run_that_was_interrupted_is_said_when_its_file_is_opened(project, fra
     assert ("[resume]" in words(scene)) == ("before its first frame" not in words(scene)) == bool(frames)
     listed = drawn(scene, bpy.types.SMOKELIFT_PT_view_results)
     assert listed.count("[show_take]") == (2 if frames else 1)
-    assert smoke_takes.write_take(smoke(scene)) == Take(
-        take.directory.with_name("take_0003" if frames else "take_0002")
-    )
+    assert smoke_takes.write_take(smoke(scene)).directory.name == ("take_0003" if frames else "take_0002")
 
 
 @pytest.mark.parametrize("moved", [False, True])

@@ -65,9 +65,8 @@ def test_the_view_has_the_plate_of_the_render_and_the_clip_at_a_switch(shot, tmp
         setattr(obj.smokelift, name, False)
     obj.smokelift.set_up_plate = False
     takes = [made(tmp_path, number=number) for number in (1, 2)]
-    for take, background in zip(
-        takes, ({"image": str(EXAMPLE / "plate.png")}, {"color": [0.2, 0.5, 1.0]}), strict=True
-    ):
+    backgrounds = {"image": str(EXAMPLE / "plate.png")}, {"color": [0.2, 0.5, 1.0]}
+    for take, background in zip(takes, backgrounds, strict=True):
         with changed(take) as index:
             index["scene"] |= {"background": background, "camera": {}}
     volume.show(obj, takes[0])

@@ -145,6 +145,7 @@ def test_each_tick_sets_up_its_part_alone(filmed, part) -> None:
     assert [name for name in before if before[name] != after[name]] == [part]
 
 
+PLANES = (compositing.FLOOR, plate.CARD)
 PLACES = ("WORLD", "COMPOSITE", "PROJECTION")
 
 
@@ -159,11 +160,7 @@ def traces(scene: bpy.types.Scene) -> dict[str, object]:
         "composited": compositing.GROUP in nodes and not nodes[compositing.GROUP].mute,
         "world": "Smokelift" in world and not world["Smokelift"].mute,
         "held out": any(each.holdout for each in scene.view_layers[0].layer_collection.children),
-        "objects": {
-            name
-            for name in (compositing.FLOOR, plate.CARD)
-            if name in scene.objects and not scene.objects[name].hide_render
-        },
+        "objects": {obj.name for obj in scene.objects if obj.name in PLANES and not obj.hide_render},
     }
 
 

@@ -185,6 +185,7 @@ def part(what: str, how: str = "", origin: str = "made up", **settings: float) -
 
 CONTINUED = "Frames {} to {} are a simulation that starts from frame {}, with 3 of the clip."
 LOOP = "In frames {} to {} the end of the loop becomes its start."
+CHAIN = [part("continue", CONTINUED), part("retime"), part("loop", LOOP.format(1, 3))]
 MADE = "degrees beside it. Made up: Depth Detail 0.5, Variation 3."
 
 
@@ -195,10 +196,7 @@ MADE = "degrees beside it. Made up: Depth Detail 0.5, Variation 3."
         ([part("velocity", origin="estimated")], "degrees beside it. Nothing is made up"),
         ([], ""),
         ([part("continue", CONTINUED.format(7, 11, 6))], CONTINUED.format(46, 50, 45)),
-        (
-            [part("continue", CONTINUED), part("retime"), part("loop", LOOP.format(1, 3))],
-            f"{LOOP.format(40, 42)} Before",
-        ),
+        (CHAIN, f"{LOOP.format(40, 42)} Before"),
     ],
 )
 def test_what_is_made_up_is_said(shot, tmp_path, parts, said) -> None:
