@@ -28,10 +28,10 @@ the depth to 0.165 of its half (docs/experiments/density-axis.md)."""
 
 def box_of(smoke: bpy.types.Object) -> bpy.types.Object | None:
     """The box that holds the smoke."""
-    return in_scene(scene_of(smoke), smoke.smokelift.box)
+    return _in_scene(scene_of(smoke), smoke.smokelift.box)
 
 
-def in_scene(scene: bpy.types.Scene, obj: bpy.types.Object | None) -> bpy.types.Object | None:
+def _in_scene(scene: bpy.types.Scene, obj: bpy.types.Object | None) -> bpy.types.Object | None:
     """The object if the scene holds it. A setting still refers to an object that was deleted."""
     return obj if obj is not None and obj.name in scene.objects else None
 
@@ -39,7 +39,7 @@ def in_scene(scene: bpy.types.Scene, obj: bpy.types.Object | None) -> bpy.types.
 def has_inlet(smoke: bpy.types.Object) -> bool:
     """Whether an inlet says where the smoke enters, and so where it stands."""
     settings = smoke.smokelift
-    return settings.camera_mode == "SCENE" and in_scene(scene_of(smoke), settings.inlet) is not None
+    return settings.camera_mode == "SCENE" and _in_scene(scene_of(smoke), settings.inlet) is not None
 
 
 def box_corners(box: bpy.types.Object) -> list[Vector]:
@@ -47,7 +47,27 @@ def box_corners(box: bpy.types.Object) -> list[Vector]:
     return [box.matrix_world @ Vector(corner) for corner in box.bound_box]
 
 
-def domain_table(box: bpy.types.Object, rotation: Matrix, settings: bpy.types.PropertyGroup) -> dict[str, Any]:
+def geometry_tables(smoke: bpy.types.Object, depsgraph: bpy.types.Depsgraph, quick: bool) -> dict[str, Any]:
+    """The tables of box, camera and inlet where these are the scene's, which is evaluated in a frame; else none.
+
+    ``quick`` reads the camera in the current frame only. ShotError if something is missing or unusable.
+    """
+    settings, box = smoke.smokelift, box_of(smoke)
+    if settings.camera_mode != "SCENE":
+        return {}
+    if box is None:
+        raise ShotError("The smoke has no box: press Make Box, and move it so that it holds the smoke.")
+    rotation = box.matrix_world.to_quaternion().to_matrix()
+    tables: dict[str, Any] = {"domain": _domain_table(box, rotation, settings)}
+    tables["camera"] = _camera_in_frames(smoke, rotation, box_corners(box), quick)
+    tables["domain"] = _keep_camera_outside(tables["domain"], tables["camera"], box, rotation)
+    inlet = _in_scene(scene_of(smoke), settings.inlet)
+    if inlet is not None:
+        tables["inlet"] = [_inlet_table(inlet.evaluated_get(depsgraph), rotation, tables["domain"])]
+    return tables
+
+
+def _domain_table(box: bpy.types.Object, rotation: Matrix, settings: bpy.types.PropertyGroup) -> dict[str, Any]:
     """The domain: the box in cubic voxels, a multiple of four along each side. It grows and keeps its floor."""
     low, high = _sides_of(box, rotation)
     extent = high - low
@@ -73,7 +93,7 @@ def is_inside(low: Sequence[float], high: Sequence[float], place: Sequence[float
     return all(a + margin <= here <= b - margin for a, here, b in zip(low, place, high, strict=True))
 
 
-def keep_camera_outside(
+def _keep_camera_outside(
     domain: dict[str, Any], camera: dict[str, Any], box: bpy.types.Object, rotation: Matrix
 ) -> dict[str, Any]:
     """The domain, grown to the side away from a camera that would else stand in what cubes add to the box.
@@ -100,7 +120,7 @@ def keep_camera_outside(
     return {**domain, "min": start, "max": end}
 
 
-def inlet_table(inlet: bpy.types.Object, rotation: Matrix, domain: dict[str, Any]) -> dict[str, Any]:
+def _inlet_table(inlet: bpy.types.Object, rotation: Matrix, domain: dict[str, Any]) -> dict[str, Any]:
     """A ball, as large as the Empty is drawn."""
     center = rotation.inverted() @ inlet.matrix_world.translation
     radius = inlet.empty_display_size * max(abs(scale) for scale in inlet.matrix_world.to_scale())
@@ -188,7 +208,7 @@ def _camera_table(smoke: bpy.types.Object, depsgraph: bpy.types.Depsgraph, rotat
     }
 
 
-def camera_over_frames(smoke: bpy.types.Object, rotation: Matrix, corners: list[Vector], quick: bool) -> dict[str, Any]:
+def _camera_in_frames(smoke: bpy.types.Object, rotation: Matrix, corners: list[Vector], quick: bool) -> dict[str, Any]:
     """The camera's table: one matrix, or one for every used frame if the camera moves.
 
     Each frame costs an evaluation of the whole scene, so a few frames decide whether the camera moves; ``quick`` reads

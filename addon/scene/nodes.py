@@ -139,33 +139,3 @@ def feed(tree: Tree, socket: Socket, value: Any) -> None:
         tree.links.new(value, socket)
     else:
         socket.default_value = value
-
-
-def get_input(modifier: bpy.types.Modifier, name: str) -> Any:
-    """The value of an input of a modifier's node group."""
-    holder, key = _input(modifier, name)
-    return holder.value if key is None else holder.get(key)
-
-
-def set_input(modifier: bpy.types.Modifier, name: str, value: Any) -> None:
-    """Set an input of a modifier's node group."""
-    holder, key = _input(modifier, name)
-    if key is None:
-        holder.value = value
-    else:
-        holder[key] = value
-
-
-def _input(modifier: bpy.types.Modifier, name: str) -> tuple[Any, str | None]:
-    """What holds an input of a modifier as its attribute ``value``, or before 5.2 the modifier itself and the key."""
-    key = modifier.node_group.interface.items_tree[name].identifier
-    return (getattr(modifier.properties.inputs, key), None) if hasattr(modifier, "properties") else (modifier, key)
-
-
-def input_path(modifier: bpy.types.Modifier, name: str) -> str:
-    """The path from its object to the value of an input of a modifier's node group, for a driver."""
-    _, key = _input(modifier, name)
-    before = f'modifiers["{modifier.name}"]'
-    if key is not None:
-        return f'{before}["{key}"]'
-    return f"{before}.properties.inputs.{modifier.node_group.interface.items_tree[name].identifier}.value"

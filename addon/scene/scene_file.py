@@ -16,17 +16,7 @@ from ..core import ShotError
 from ..core.contract import IMAGE_SUFFIXES, PANORAMA_SUFFIXES, SIDES
 from .blender import absolute, at_frame, file_of
 from .clip import background_table, clip_table, start_frame
-from .geometry import (
-    box_corners,
-    box_of,
-    camera_over_frames,
-    domain_table,
-    has_inlet,
-    in_scene,
-    inlet_table,
-    is_inside,
-    keep_camera_outside,
-)
+from .geometry import engine_to_world, geometry_tables, has_inlet, is_inside
 from .pictures import mask_path
 from .smoke import scene_of
 
@@ -60,22 +50,11 @@ def shot_tables(smoke: bpy.types.Object, quick: bool = False) -> dict[str, Any]:
     settings, scene = smoke.smokelift, scene_of(smoke)
     tables = footage_tables(smoke, quick)
     with at_frame(scene, scene.frame_current if quick else start_frame(settings)) as depsgraph:
-        rotation = Matrix.Identity(3)
-        if settings.camera_mode == "SCENE":
-            box = box_of(smoke)
-            if box is None:
-                raise ShotError("The smoke has no box: press Make Box, and move it so that it holds the smoke.")
-            rotation = box.matrix_world.to_quaternion().to_matrix()
-            tables["domain"] = domain_table(box, rotation, settings)
-            tables["camera"] = camera_over_frames(smoke, rotation, box_corners(box), quick)
-            tables["domain"] = keep_camera_outside(tables["domain"], tables["camera"], box, rotation)
-            inlet = in_scene(scene, settings.inlet)
-            if inlet is not None:
-                tables["inlet"] = [inlet_table(inlet.evaluated_get(depsgraph), rotation, tables["domain"])]
+        tables |= geometry_tables(smoke, depsgraph, quick)
         if settings.use_medium:
             tables["medium"] = {key: getattr(settings, key) for key in ("extinction", "albedo", "anisotropy")}
         if settings.light_mode == "SCENE":
-            tables["lights"] = _light_tables(scene, depsgraph, rotation, tables.get("domain"))
+            tables["lights"] = _light_tables(scene, depsgraph, engine_to_world(smoke).to_3x3(), tables.get("domain"))
         if settings.closed:
             tables.setdefault("domain", {})["closed"] = [side for side in SIDES if side in settings.closed]
     if "image" in tables.get("background", {}) and "matrices" in tables.get("camera", {}):
