@@ -156,7 +156,7 @@ class SMOKELIFT_OT_place(Needing, bpy.types.Operator):
         return outcome
 
 
-def draw_shot(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
+def draw_shot(layout: bpy.types.UILayout, smoke: bpy.types.Object) -> None:
     settings = smoke.smokelift
     row = layout.row(align=True)
     row.prop(settings, "plate_mode")

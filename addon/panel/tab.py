@@ -45,7 +45,7 @@ def _draw_tab(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy
     if settings.clip is None:
         return
     draw_clip(layout, context, smoke)
-    draw_shot(layout, context, smoke)
+    draw_shot(layout, smoke)
     draw_qualities(layout, context, smoke)
     layout.prop(settings, "detail")
     draw_settings(layout, settings, "seed", active=settings.detail > 0.0)
