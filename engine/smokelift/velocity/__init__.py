@@ -31,8 +31,9 @@ from smokelift.checks import require_kind
 from smokelift.scene import Side
 from smokelift.transport import Velocity
 from smokelift.velocity.coarse_to_fine import CoarseToFine, VelocitySettings
-from smokelift.velocity.estimator import DensityPair, VelocityEstimator, predict_velocity, refine
+from smokelift.velocity.estimator import DensityPair, VelocityEstimator, predict_velocity
 from smokelift.velocity.optical_flow import PicturePair
+from smokelift.velocity.pyramid import refine
 from smokelift.velocity.solver import PrimalDual, ProjectedCG, Solver
 
 

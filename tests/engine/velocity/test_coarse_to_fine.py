@@ -8,7 +8,7 @@ import pytest
 from smokelift import Velocity, _core, estimate_velocity
 from smokelift.baselines.velocity import PaperVelocity
 from smokelift.scene import SIDES, Camera, Domain
-from smokelift.transport import face_shapes
+from smokelift.transport import divergence, face_shapes
 from smokelift.velocity import (
     CoarseToFine,
     DensityPair,
@@ -18,8 +18,8 @@ from smokelift.velocity import (
     predict_velocity,
 )
 from smokelift.velocity.coarse_to_fine import ONE_VIEW_SMOOTHNESS
-from smokelift.velocity.estimator import refine
 from smokelift.velocity.optical_flow import correct_by_optical_flow
+from smokelift.velocity.pyramid import refine
 from tests.engine.velocity.known_motions import (
     DT,
     LARGE,
@@ -158,6 +158,15 @@ def turning_faces(angle):
         x, _, z = positions(shape)
         faces.append([x - (c * x + s * z), 0 * x, z - (c * z - s * x)][axis] * VOXEL / DT)
     return Velocity(faces, VOXEL)
+
+
+def test_prediction_is_free_of_divergence_and_keeps_a_uniform_flow():
+    steady = uniform((0.3, -0.2, 0.5))
+    for a, b in zip(predict_velocity(steady, DT).faces, steady.faces, strict=True):
+        np.testing.assert_allclose(a, b, atol=1e-5)
+    turning = estimate_velocity(*rotation(0.2)[:2], DT, VOXEL)
+    predicted = predict_velocity(turning, DT)
+    assert np.abs(divergence(predicted)).max() * VOXEL < 1e-4 * np.abs(predicted.centres()).max()
 
 
 def test_buoyancy_is_found_beside_a_prediction():
