@@ -11,9 +11,8 @@ from dataclasses import dataclass, field
 
 from smokelift.transport import StaggeredGrid, Velocity
 from smokelift.velocity.estimator import DensityPair, in_meters, motion_weight, predict_velocity
-from smokelift.velocity.linearization import least_squares, linearize
+from smokelift.velocity.linearization import blurred, least_squares, linearize
 from smokelift.velocity.optical_flow import PicturePair
-from smokelift.velocity.preparation import blurred
 from smokelift.velocity.solver import PrimalDual, Solver
 
 

@@ -9,10 +9,15 @@ from smokelift.checks import require_kind
 from smokelift.scene.checks import integer
 from smokelift.transport import Array, StaggeredGrid, Velocity, require_same_shape, without_divergence
 from smokelift.velocity.estimator import DensityPair, in_meters, motion_weight, predict_velocity
-from smokelift.velocity.linearization import SMOKE_THRESHOLD, least_squares, linearize
-from smokelift.velocity.momentum import fit_center
+from smokelift.velocity.linearization import (
+    SMOKE_THRESHOLD,
+    PreparedPair,
+    fit_center,
+    least_squares,
+    linearize,
+    prepare,
+)
 from smokelift.velocity.optical_flow import PicturePair, correct_by_optical_flow
-from smokelift.velocity.preparation import PreparedPair, prepare
 from smokelift.velocity.pyramid import coarsen_density, coarsen_velocity, default_coarsening, refine, smooth_velocity
 from smokelift.velocity.solver import ProjectedCG, Solver
 
