@@ -41,7 +41,7 @@ from smokelift.render import taichi_runtime as taichi
 from smokelift.baselines import kernels
 from smokelift.render.gpu import camera_kernels
 from smokelift.render.gpu.backend import LightSweeps
-from smokelift.render.light_sweeps import ParallelSweep
+from smokelift.render.plan import ParallelSweep
 from smokelift.render.renderer import Image, Optics, Volume
 from smokelift.scene import Camera, Domain
 from smokelift.scene.projection import ray_through_pixels

@@ -3,7 +3,7 @@
     Scene -> Optics     domain, medium, lights, scattering           image
       lights            all as directional and point lights          image, environment
     Optics -> Renderer  one camera before one background             renderer
-      RenderPlan        rays and light sweeps in voxel coordinates   plan, camera_rays, light_sweeps
+      RenderPlan        rays and light sweeps in voxel coordinates   plan
       Backend           light to every voxel, then along the rays    cpu_backend (cpp/) or gpu/ (Taichi), by device
 
 `render` and `render_gradient` go all the way from a density and a scene (``image``).

@@ -12,8 +12,7 @@ import numpy as np
 import smokelift._core as _core
 from smokelift.checks import Array
 from smokelift.render.diffuse_light import DiffuseLight
-from smokelift.render.light_sweeps import ParallelSweep
-from smokelift.render.plan import RenderPlan
+from smokelift.render.plan import ParallelSweep, RenderPlan
 
 
 class CpuBackend:

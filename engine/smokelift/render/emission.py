@@ -2,7 +2,7 @@
 
     L = integral of T(s) e(s) ds,   T(s) the transmittance of the smoke before s,
 
-on the samples of `smokelift.render.camera_rays`, where the renderer's are: a sample stands for a step of length d with
+on the samples of `smokelift.render.plan`, where the renderer's are: a sample stands for a step of length d with
 constant extinction kappa and emission e, which adds e (1 - exp(-kappa d)) / kappa to what reaches it. Emission is
 linear in the picture, so that a matrix says all of it.
 """
@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from scipy import ndimage, sparse
 
 from smokelift.checks import Mask
-from smokelift.render.camera_rays import BAND, camera_rays
 from smokelift.render.image import LARGEST_DEPTH
+from smokelift.render.plan import BAND, camera_rays
 from smokelift.render.renderer import Image, Optics, Volume
 from smokelift.scene import Camera
 from smokelift.scene.domain import LATERAL, box_around

@@ -16,11 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.render import device
-from smokelift.render.camera_rays import camera_rays
 from smokelift.render.cpu_backend import CpuBackend
 from smokelift.render.device import products_on_one_thread
-from smokelift.render.light_sweeps import light_sweeps
-from smokelift.render.plan import RenderPlan, to_eye
+from smokelift.render.plan import RenderPlan, camera_rays, light_sweeps, to_eye
 from smokelift.scene import SHADOWED, Camera, Domain, FiniteLight, Medium, PointLight, Scattering
 from smokelift.scene.domain import box_around
 

@@ -11,8 +11,7 @@ from smokelift.render import taichi_runtime as taichi
 from smokelift.render.diffuse_light import DiffuseLight
 from smokelift.render.gpu import camera_kernels as camera
 from smokelift.render.gpu import light_kernels as light
-from smokelift.render.light_sweeps import Face, ParallelSweep, PointSweep, Sweep
-from smokelift.render.plan import RenderPlan
+from smokelift.render.plan import Face, ParallelSweep, PointSweep, RenderPlan, Sweep
 
 
 class GpuBackend:

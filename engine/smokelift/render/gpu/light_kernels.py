@@ -13,7 +13,7 @@ Nothing is atomic: adjoints gather.
 import numpy as np
 import taichi as ti
 
-from smokelift.render.light_sweeps import CLOSEST
+from smokelift.render.plan import CLOSEST
 
 ndarray2 = ti.types.ndarray(dtype=ti.f32, ndim=2)
 ndarray3 = ti.types.ndarray(dtype=ti.f32, ndim=3)
