@@ -8,7 +8,7 @@ from scipy import ndimage
 import smokelift._core as _core
 from smokelift.checks import Array
 from smokelift.render import taichi_runtime as taichi
-from smokelift.render.diffuse_light import DiffuseLight
+from smokelift.render.cpu_backend import DiffuseLight
 from smokelift.render.gpu import camera_kernels as camera
 from smokelift.render.gpu import light_kernels as light
 from smokelift.render.plan import Face, ParallelSweep, PointSweep, RenderPlan, Sweep
