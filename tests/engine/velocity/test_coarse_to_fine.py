@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from smokelift import Velocity, _core, estimate_velocity
-from smokelift.baselines.velocity import PaperVelocity
+from smokelift.baselines.paper_method import PaperVelocity
 from smokelift.scene import SIDES, Camera, Domain
 from smokelift.transport import divergence, face_shapes
 from smokelift.velocity import (
