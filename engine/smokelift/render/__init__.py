@@ -1,7 +1,7 @@
 """The differentiable renderer: a density and a scene in, an image out, and the exact derivative back.
 
     Scene -> Optics     domain, medium, lights, scattering           image
-      lights            all as directional and point lights          image, environment
+      lights            all as directional and point lights          environment
     Optics -> Renderer  one camera before one background             renderer
       RenderPlan        rays and light sweeps in voxel coordinates   plan
       Backend           light to every voxel, then along the rays    cpu_backend (cpp/) or gpu/ (Taichi), by device

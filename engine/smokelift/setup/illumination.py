@@ -16,7 +16,7 @@ from smokelift.extraction.element import SOURCE_SIDE, extract_element
 from smokelift.extraction.fire import MIN_COLORED_VALUE
 from smokelift.footage.images import Picture, channel_mean, reduced_size
 from smokelift.footage.noise import Noise
-from smokelift.render.image import environment_count
+from smokelift.render.environment import environment_count
 from smokelift.scene import SCATTERINGS, SHADOWED, DirectionalLight, EnvironmentLight, Light, Medium, Scattering
 from smokelift.setup.coarse import SCATTERING_TOLERANCE, CoarseFrame, held_out
 from smokelift.setup.first_estimate import FirstEstimate, SmokeSamples
