@@ -24,6 +24,7 @@ from scipy.special import gamma, gammainc
 
 import smokelift._core as _core
 from smokelift.density.hull import Places
+from smokelift.density.lattice_noise import Scatter
 from smokelift.density.upright_plane import (
     TINY_DOUBLE,
     PlanePicture,
@@ -32,7 +33,6 @@ from smokelift.density.upright_plane import (
     on_upright_plane,
     view_frame,
 )
-from smokelift.density.wander import Scatter
 from smokelift.scene import Camera, Domain
 
 FLATNESS = 3.5
