@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from smokelift.density.hull import Places, project_voxels
 from smokelift.density.lattice_noise import Scatter, Wander
-from smokelift.density.levels import any_of_two, with_neighbors
+from smokelift.density.objective import any_of_two, with_neighbors
 from smokelift.density.observation import ObservedClip, ObservedView, ViewSet, shadowed_optical_depth
 from smokelift.density.profile import PROFILE_CUT, DepthProfile
 from smokelift.density.upright_plane import SmokeAxis, view_frame

@@ -17,9 +17,8 @@ import smokelift._core as _core
 from smokelift.checks import MAX_MAGNITUDE, listed, numbers, require_kind
 from smokelift.density.depth_prior import DepthEstimate, RoundDepth
 from smokelift.density.descent import descend
-from smokelift.density.levels import BLUR_REACH
 from smokelift.density.multiplicative import fit_multiplicative
-from smokelift.density.objective import camera_terms
+from smokelift.density.objective import BLUR_REACH, camera_terms
 from smokelift.density.observation import Observation, ViewSet, eight_bit_plate
 from smokelift.extraction.element import extract_element, shows_transmittance, usual_source
 from smokelift.extraction.given_background import background_picture, single_color

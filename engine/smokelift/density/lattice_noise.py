@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from smokelift.checks import Doubles
-from smokelift.density.levels import Level
+from smokelift.density.objective import Level
 from smokelift.density.upright_plane import PlaneRays, view_frame
 from smokelift.scene import Camera, Domain
 

@@ -22,8 +22,8 @@ from scipy import ndimage
 
 from smokelift.density.depth_prior import DepthEstimate, RoundDepth
 from smokelift.density.lattice_noise import SMALLEST_BLUR, Wander, stretched_noise
-from smokelift.density.levels import TINY, Level
 from smokelift.density.multiplicative import fit_multiplicative, take_turns
+from smokelift.density.objective import TINY, Level
 from smokelift.density.observation import ObservedClip, ViewSet
 from smokelift.density.texture import ClipTexture, Exemplar, Picture, enlarged, fine_energy
 from smokelift.density.turntable import Turntable, UprightSmoke
