@@ -169,7 +169,14 @@ class DepthProfile:
         middle = np.zeros(amount.shape)
         for _ in range(STEPS_TO_AXIS):
             middle = axis.at(*rays.at(middle))
-        deviation = _deviation(*rays.at(middle), amount, camera, domain, axis)
+        at = rays.at(middle)
+        if axis.several:
+            across = axis.read(axis.widths, *at)
+        else:
+            across = MIN_SPREAD_BIAS * smallest_spread(amount, camera, domain).read(*at)
+        behind = LASTING_DISTANCE * axis.read(axis.spreads, *at)
+        spread = np.sqrt(across * ball_spread(amount, camera, domain) + behind**2)
+        deviation = np.maximum(spread, domain.voxel_size)  # in depth
         narrowing, offset = 1.0, np.zeros(amount.shape)
         if scatter is not None:
             # a lobe moves as one, so what is as deep as its surroundings on the mean tells how far
@@ -212,21 +219,3 @@ class DepthProfile:
             width=self._width,
             flatness=FLATNESS,
         )
-
-
-def _deviation(
-    height: NDArray[np.float64],
-    lateral: NDArray[np.float64],
-    amount: NDArray[np.float32],
-    camera: Camera,
-    domain: Domain,
-    axis: SmokeAxis,
-) -> NDArray[np.float64]:
-    """Standard deviation (m) in depth of the pixels' smoke (rows, columns); its middles are at heights and laterals."""
-    if axis.several:
-        across = axis.read(axis.widths, height, lateral)
-    else:
-        across = MIN_SPREAD_BIAS * smallest_spread(amount, camera, domain).read(height, lateral)
-    behind = LASTING_DISTANCE * axis.read(axis.spreads, height, lateral)
-    spread = np.sqrt(across * ball_spread(amount, camera, domain) + behind**2)
-    return np.asarray(np.maximum(spread, domain.voxel_size))

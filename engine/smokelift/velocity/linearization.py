@@ -93,23 +93,16 @@ class PreparedPair:
 def prepare(before: Array, after: Array) -> PreparedPair:
     """Blur two densities and reduce their contrast, as the first of `ATTEMPTS` that leaves little noise."""
     for reduced, width, allowed in ATTEMPTS:
-        first, second = (reduced_contrast(a) if reduced else a for a in (before, after))
+        first, second = (np.sqrt(a) * np.sqrt(np.sqrt(a)) if reduced else a for a in (before, after))
         smoke = second > SMOKE_THRESHOLD * second.max()
-        raw = float(np.hypot(noise_level(first, smoke), noise_level(second, smoke)))
+        raw = float(np.hypot(_noise_level(first, smoke), _noise_level(second, smoke)))
         first, second, left = blurred(first, width), blurred(second, width), raw * _passed(width)
-        if left <= allowed * rms_gradient(gradient(second), smoke):
+        if left <= allowed * _rms_gradient(gradient(second), smoke):
             break
     return PreparedPair(first, second, left**2, reduced)
 
 
-def reduced_contrast(density: Array) -> Array:
-    """density^(3/4)."""
-    root = np.sqrt(density)
-    result: Array = root * np.sqrt(root)
-    return result
-
-
-def noise_level(density: Array, smoke: npt.NDArray[np.bool_]) -> float:
+def _noise_level(density: Array, smoke: npt.NDArray[np.bool_]) -> float:
     """Standard deviation of white noise in a density, from its finest scale inside the smoke."""
     finest, inside = density, smoke
     for axis in range(3):
@@ -170,7 +163,7 @@ def linearize(before: Array, after: Array, weight: Array, u: StaggeredGrid) -> L
     density = np.maximum(carried, after)
     smoke = density > np.float32(SMOKE_THRESHOLD) * density.max()
     direction = gradient(np.float32(0.5) * (carried + after))
-    scale = rms_gradient(direction, smoke)
+    scale = _rms_gradient(direction, smoke)
     if scale == 0:
         return None
     inverse = np.float32(1 / scale)
@@ -187,7 +180,7 @@ def gradient(cells: Array) -> Faces:
     return x, y, z
 
 
-def rms_gradient(components: Faces, smoke: npt.NDArray[np.bool_]) -> float:
+def _rms_gradient(components: Faces, smoke: npt.NDArray[np.bool_]) -> float:
     """Root mean square of a gradient in the smoke; 0 where there is none."""
     count = np.count_nonzero(smoke)
     squares = sum(float(np.sum(np.square(g[smoke]), dtype=np.float64)) for g in components)
@@ -228,24 +221,14 @@ def least_squares(
     )
 
 
-@dataclass(frozen=True, eq=False)
-class Center:
-    """The motion around which the velocity is regularized: t u_p + P(m), in voxels per frame.
+def fit_center(
+    prediction: StaggeredGrid | None, density: Array, linear: Linearization, grid: StaggeredGrid
+) -> tuple[StaggeredGrid, float, float]:
+    """The motion around which the velocity is regularized, t u_p + P(m), the trust t, from 0 to 1, and the dissipation.
 
-    `trust` is t, from 0 to 1. `dissipation` is the fraction of the smoke that dissolves in a frame, at most 1 and
-    below zero where all of it gets denser.
-    """
-
-    motion: StaggeredGrid
-    trust: float
-    dissipation: float
-
-
-def fit_center(prediction: StaggeredGrid | None, density: Array, linear: Linearization, grid: StaggeredGrid) -> Center:
-    """Fit trust, momentum and dissipation to a linearized change.
-
-    The prediction is in voxels per frame, and the density (nx, ny, nz) is what momentum goes with. ``grid`` is any
-    field on the estimate's grid.
+    All are fitted to a linearized change. The dissipation is the fraction of the smoke that dissolves in a frame, at
+    most 1. The prediction is in voxels per frame, as the motion is, and the density (nx, ny, nz) is what momentum goes
+    with. ``grid`` is any field on the estimate's grid.
     """
     rows = 4 if prediction is None else 1
     columns = [
@@ -264,11 +247,11 @@ def fit_center(prediction: StaggeredGrid | None, density: Array, linear: Lineari
             dissipation, found = 0.0, without_dissipation
     momentum = found[: 3 * rows].reshape(rows, 3)
     if prediction is None:
-        return Center(_set_in_motion(density, MOMENTUM * momentum, grid), 0.0, dissipation)
+        return _set_in_motion(density, MOMENTUM * momentum, grid), 0.0, dissipation
     trust = float(np.clip(found[3], 0, 1))
     gained = _set_in_motion(density, momentum, grid)
     faces = zip(gained.faces, prediction.faces, strict=True)
-    return Center(grid.with_faces(own + np.float32(trust) * predicted for own, predicted in faces), trust, dissipation)
+    return grid.with_faces(own + np.float32(trust) * predicted for own, predicted in faces), trust, dissipation
 
 
 def _set_in_motion(density: Array, momentum: npt.NDArray[np.float64], grid: StaggeredGrid) -> StaggeredGrid:
