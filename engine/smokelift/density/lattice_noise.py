@@ -21,10 +21,9 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 
-from smokelift.checks import Doubles
+from smokelift.checks import Array, Doubles
 from smokelift.density.objective import Level
 from smokelift.density.upright_plane import PlaneRays, view_frame
 from smokelift.scene import Camera, Domain
@@ -69,7 +68,7 @@ LARGEST = 2.0
 class Lattice(NamedTuple):
     """Values at nodes, of unit variance between them, and the place (axes,) in nodes of what lies at 0."""
 
-    values: NDArray[np.float32]
+    values: Array
     corner: Doubles
 
     def read(self, places: Doubles) -> Doubles:
@@ -94,9 +93,7 @@ def lattices(seed: int, count: int, axes: int) -> tuple[Lattice, ...]:
     )
 
 
-def stretched_noise(
-    level: Level, moved: NDArray[np.float64], width: float, strengths: tuple[float, ...], seed: int
-) -> NDArray[np.float32]:
+def stretched_noise(level: Level, moved: Doubles, width: float, strengths: tuple[float, ...], seed: int) -> Array:
     """Octaves of noise (n,) at the voxels that may hold smoke, each stretched by the motion of the coarser ones.
 
     The noise has ``moved`` (3,), and the smoke is ``width`` wide (standard deviation across its axis), both in voxels
@@ -107,12 +104,8 @@ def stretched_noise(
 
 
 def _sum(
-    level: Level,
-    moved: NDArray[np.float64],
-    width: float,
-    strengths: tuple[float, ...],
-    unread: Iterator[Lattice],
-) -> tuple[NDArray[np.float32], NDArray[np.float32], int]:
+    level: Level, moved: Doubles, width: float, strengths: tuple[float, ...], unread: Iterator[Lattice]
+) -> tuple[Array, Array, int]:
     """The sum (n,) of the octaves that a grid holds, and their number.
 
     Between them is the motion (3, n) in voxels that draws out the next, which is half as blurred.
@@ -125,7 +118,7 @@ def _sum(
             found[...] = level.from_coarser(level.coarser.views.volume(values))
     middle = (size - 1) / 2 - moved
 
-    def octave(blur: float, strength: float) -> NDArray[np.float32]:
+    def octave(blur: float, strength: float) -> Array:
         lattice, spacing = next(unread), blur / NODE_BLUR
         shift = middle / spacing + lattice.corner
         values = where.read_lattice(lattice.values, size / spacing, shift.tolist(), motion, 1 / spacing)
@@ -154,7 +147,7 @@ class Scatter:
     moves as one.
     """
 
-    offset: NDArray[np.float32]
+    offset: Array
     deviation: float
     width: float
 

@@ -22,7 +22,6 @@ multiplicative algebraic reconstruction (Gordon, Bender and Herman 1970).
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 
 import smokelift._core as _core
@@ -114,7 +113,7 @@ class _Smoke:
     def __init__(self, density: Volume, where: _core.MarkedVoxels, plausible: Volume | None = None) -> None:
         self._where, self.values = where, where.take(density)
         self._volume = np.zeros(density.shape, np.float32)
-        self._sensitivities: dict[int, NDArray[np.float32]] = {}
+        self._sensitivities: dict[int, Array] = {}
         self._plausible = None if plausible is None else where.take(plausible)
         densest = 0.0 if self._plausible is None else float(self._plausible.max(initial=MIN_SCALE))
         self._faint = MIN_PLAUSIBLE * densest
@@ -137,7 +136,7 @@ class _Smoke:
         self._where.scale_along_rays(rays, values, self._plausible, steps, self._faint, MAX_UNEVENNESS, RELAXATION, out)
         return out
 
-    def _sensitivity(self, values: Array, term: Term, image: Image, transmittance: Image) -> NDArray[np.float32]:
+    def _sensitivity(self, values: Array, term: Term, image: Image, transmittance: Image) -> Array:
         """|dL / d ln s| / |L - B| (rows, columns) of a density, whose image and transmittance are given."""
         if term.renderer.absorbs_only:  # L = T B and ln T is proportional to s
             slope = image * np.log(np.maximum(transmittance, 1e-30))[..., None]
@@ -148,7 +147,7 @@ class _Smoke:
         return np.asarray(np.sqrt(_over_channels(slope, slope)) / scale)
 
 
-def _log_scale(image: Image, transmittance: Image, sensitivity: NDArray[np.float32], term: Term) -> NDArray[np.float32]:
+def _log_scale(image: Image, transmittance: Image, sensitivity: Array, term: Term) -> Array:
     """Logarithm (rows, columns) of each pixel's scale, damped and smoothed."""
     background, weight = term.view.background, np.sqrt(term.weight)
     clear = transmittance[..., None]

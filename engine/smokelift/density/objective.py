@@ -22,9 +22,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 import smokelift._core as _core
+from smokelift.checks import Array, Mask
 from smokelift.density.observation import ObservedView, ViewSet
 from smokelift.footage.images import area_average
 from smokelift.render import Image, Renderer, Volume
@@ -59,7 +59,7 @@ class Term:
 
     view: ObservedView
     renderer: Renderer
-    weight: NDArray[np.float32]
+    weight: Array
 
     def loss(self, residual: Image) -> float:
         """The term's part of the objective, from L - I (rows, columns, channels)."""
@@ -71,7 +71,7 @@ class Term:
         return 2 * self.weight[..., None] * residual
 
 
-def camera_terms(views: ViewSet, inside: Sequence[NDArray[np.float32]]) -> list[Term]:
+def camera_terms(views: ViewSet, inside: Sequence[Array]) -> list[Term]:
     """A term for every camera's picture.
 
     Smoke outside the domain is not modelled. So a pixel counts by ``inside`` (one picture per view), the fraction of
@@ -116,7 +116,7 @@ class Level:
     """
 
     views: ViewSet
-    inside_fraction: tuple[NDArray[np.float32], ...]
+    inside_fraction: tuple[Array, ...]
     coarseness: int = 1
 
     @cached_property
@@ -136,7 +136,7 @@ class Level:
         """Terms of the cameras' pictures; see `camera_terms`."""
         return camera_terms(self.views, self.inside_fraction)
 
-    def from_coarser(self, values: Volume) -> NDArray[np.float32]:
+    def from_coarser(self, values: Volume) -> Array:
         """Values of the coarser grid at this one's voxels (n,) that may hold smoke, linear between middles."""
         fine, coarse = self._boxes()
         return _core.prolong_values(values[coarse], self.views.hull[fine])
@@ -157,7 +157,7 @@ class Level:
         means[coarse] = _core.means_of_two(density[fine], self.views.hull[fine])
         return means
 
-    def blurred(self, values: Volume, deviation: float) -> NDArray[np.float32]:
+    def blurred(self, values: Volume, deviation: float) -> Array:
         """A volume blurred by a Gaussian of so many voxels, (n,) at those that may hold smoke.
 
         It fades where the smoke ends, so compare it only with another one that is blurred alike.
@@ -185,7 +185,7 @@ class Level:
         return fine, coarse
 
 
-def _blurred(values: Volume, marked: NDArray[np.bool_], deviation: float) -> NDArray[np.float32]:
+def _blurred(values: Volume, marked: Mask, deviation: float) -> Array:
     """A volume blurred, (n,) at the marked voxels; on a grid that is as coarse as the blur allows."""
     if deviation < 2 * MIN_DEVIATION:
         return np.asarray(_core.blur(values, deviation, BLUR_REACH)[marked])
@@ -195,7 +195,7 @@ def _blurred(values: Volume, marked: NDArray[np.bool_], deviation: float) -> NDA
     return _core.prolong_values(means, marked)
 
 
-def any_of_two(voxels: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def any_of_two(voxels: Mask) -> Mask:
     """Whether any of two voxels along every axis is marked."""
     for axis in range(3):
         lead = (slice(None),) * axis
@@ -205,7 +205,7 @@ def any_of_two(voxels: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return voxels
 
 
-def with_neighbors(voxels: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def with_neighbors(voxels: Mask) -> Mask:
     """Mark the six voxels beside each marked one too: a fast `ndimage.binary_dilation`."""
     result = voxels.copy()
     for axis in range(3):

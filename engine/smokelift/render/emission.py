@@ -12,10 +12,9 @@ from dataclasses import replace
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage, sparse
 
-from smokelift.checks import Mask
+from smokelift.checks import Doubles, Indices, Mask
 from smokelift.render.image import LARGEST_DEPTH
 from smokelift.render.plan import BAND, camera_rays
 from smokelift.render.renderer import Image, Optics, Volume
@@ -60,8 +59,8 @@ def emission_matrix(density: Volume, camera: Camera, optics: Optics, pixels: Mas
 
 
 def _samples(
-    density: Volume, camera: Camera, optics: Optics, pixels: NDArray[np.intp], burning: Mask
-) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float64]]]:
+    density: Volume, camera: Camera, optics: Optics, pixels: Indices, burning: Mask
+) -> Iterator[tuple[Indices, Indices, Doubles]]:
     """Which of the pixels (n,) have a ray that crosses a plane, the four voxels (4, n) around, and their weights (m).
 
     Plane by plane from the camera on, as far as voxels (nx, ny, nz) burn. Voxels are numbers in a volume with a border

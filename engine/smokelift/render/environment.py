@@ -16,9 +16,8 @@ from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-from smokelift.checks import Doubles, Indices
+from smokelift.checks import Array, Doubles, Indices
 from smokelift.footage.images import LUMINANCE, ImageError, read_image
 from smokelift.render.renderer import Image, Optics, Volume
 from smokelift.scene import Camera, CompleteScene, DirectionalLight, Domain, EnvironmentLight, FiniteLight, Medium
@@ -196,7 +195,7 @@ def _first_largest(values: Doubles) -> int:
     return int(np.argmax(values >= values.max() * (1 - ROUNDING)))
 
 
-def _gather(picture: NDArray[np.float32]) -> tuple[Doubles, Doubles]:
+def _gather(picture: Array) -> tuple[Doubles, Doubles]:
     """Sum a picture up over `CELLS`.
 
     It returns the integrals of radiance over the cells (cells, 3), and unit vectors to their centroids (cells, 3),

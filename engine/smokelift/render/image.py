@@ -66,10 +66,7 @@ def render_gradient(
     density: Volume, scene: Scene, target: Sequence[Image], camera: Sequence[Camera]
 ) -> tuple[float, Volume, list[Image]]: ...
 def render_gradient(
-    density: Volume,
-    scene: Scene,
-    target: Image | Sequence[Image],
-    camera: Camera | Sequence[Camera] | None = None,
+    density: Volume, scene: Scene, target: Image | Sequence[Image], camera: Camera | Sequence[Camera] | None = None
 ) -> tuple[float, Volume, Image | list[Image]]:
     """Squared difference between the rendered and a target image, with its exact derivative.
 

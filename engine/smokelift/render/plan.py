@@ -49,9 +49,9 @@ CLOSEST = 1e-3
 class Rays:
     """One ray per pixel, for one grid."""
 
-    lines: NDArray[np.float32]
+    lines: Array
     """(rows, columns, 4) float32: start_b, slope_b, start_c, slope_c in voxel units, voxel centers at integers."""
-    length: NDArray[np.float32]
+    length: Array
     """(rows, columns) float32: distance between samples, m."""
     planes: NDArray[np.int32]
     """(rows, columns, 4) int32: dominant axis; +1 or -1, the direction of travel along it; first and last plane in
@@ -138,7 +138,7 @@ class RenderPlan:
     """Extinction, albedo, anisotropy."""
     rays: Rays
     """Of the camera, through the box."""
-    to_eye: NDArray[np.float64]
+    to_eye: Doubles
     """(3, 4): affine map from a voxel's index in the box to the direction from there to the eye, of any length."""
     lights: tuple[Sweep, ...]
     """In coordinates of the box, in the smoke's color."""
@@ -218,7 +218,7 @@ def _band(camera: Camera, domain: Domain, across: Doubles, up: Doubles) -> tuple
     return crossings.astype(np.float32), length.astype(np.float32), np.stack(planes, -1).astype(np.int32)
 
 
-def to_eye(camera: Camera, domain: Domain) -> NDArray[np.float64]:
+def to_eye(camera: Camera, domain: Domain) -> Doubles:
     """Return the affine map `RenderPlan.to_eye` for the voxels of a domain."""
     matrix = np.array(camera.matrix, np.float64)
     affine = np.zeros((3, 4))

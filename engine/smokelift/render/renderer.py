@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from smokelift.checks import Doubles, Mask
 from smokelift.render import device
 from smokelift.render.cpu_backend import CpuBackend
 from smokelift.render.device import products_on_one_thread
@@ -42,11 +43,11 @@ class Optics:
     """``"multiple"``: of all orders, isotropic smoke only; ``"single"``, with self-shadowing; ``"unshadowed"``: light
     reaches every voxel unattenuated; or ``"absorption"``: the background attenuated, nothing else."""
 
-    def renderer(self, camera: Camera, background: Image, support: NDArray[np.bool_] | None = None) -> Renderer:
+    def renderer(self, camera: Camera, background: Image, support: Mask | None = None) -> Renderer:
         """The renderer of a camera before a background; see `Renderer` for the parameters."""
         return Renderer(self, camera, background, support)
 
-    def plan(self, camera: Camera, support: NDArray[np.bool_] | None = None) -> RenderPlan:
+    def plan(self, camera: Camera, support: Mask | None = None) -> RenderPlan:
         """Plan the rendering for a camera; see `Renderer` for the support."""
         scattering, medium = self.scattering, self.medium
         if scattering not in get_args(Scattering):
@@ -78,7 +79,7 @@ class Optics:
             diffuse=scattering == "multiple" and len(color) > 0,
         )
 
-    def unshadowed_source(self) -> NDArray[np.float64]:
+    def unshadowed_source(self) -> Doubles:
         """Source radiance (3,), W/m^2/sr, of isotropic smoke in the middle of the domain, with nothing before it.
 
         Light that is scattered many times raises it as it raises that of the surface of a half-space, on the mean over
@@ -105,9 +106,7 @@ class Renderer:
     point light stands inside the domain, or anisotropic smoke is to scatter many times.
     """
 
-    def __init__(
-        self, optics: Optics, camera: Camera, background: Image, support: NDArray[np.bool_] | None = None
-    ) -> None:
+    def __init__(self, optics: Optics, camera: Camera, background: Image, support: Mask | None = None) -> None:
         self.optics, self.camera = optics, camera
         plan = optics.plan(camera, support)
         self._background = np.asarray(background, np.float32)

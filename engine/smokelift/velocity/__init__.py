@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from smokelift.checks import require_kind
+from smokelift.checks import Mask, require_kind
 from smokelift.scene import Side
 from smokelift.transport import Velocity
 from smokelift.velocity.coarse_to_fine import CoarseToFine, VelocitySettings
@@ -45,7 +45,7 @@ def estimate_velocity(
     settings: VelocitySettings | None = None,
     *,
     closed: tuple[Side, ...] = (),
-    inflow: npt.NDArray[np.bool_] | None = None,
+    inflow: Mask | None = None,
     prediction: Velocity | None = None,
 ) -> Velocity:
     """Estimate the velocity that carries one density into the next.

@@ -26,10 +26,10 @@ either would be fitted as motion. The regularizer penalises the distance from th
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 from scipy import ndimage
 
 import smokelift._core as _core
+from smokelift.checks import Doubles, Mask
 from smokelift.transport import Array, Faces, StaggeredGrid, at_centres, without_divergence
 
 SMOKE_THRESHOLD = 0.01
@@ -102,7 +102,7 @@ def prepare(before: Array, after: Array) -> PreparedPair:
     return PreparedPair(first, second, left**2, reduced)
 
 
-def _noise_level(density: Array, smoke: npt.NDArray[np.bool_]) -> float:
+def _noise_level(density: Array, smoke: Mask) -> float:
     """Standard deviation of white noise in a density, from its finest scale inside the smoke."""
     finest, inside = density, smoke
     for axis in range(3):
@@ -140,7 +140,7 @@ class Linearization:
     """(nx, ny, nz) float32: the density before, carried along by u_k, in the unit of `offset`."""
     weight: Array
     """(nx, ny, nz) float32: how far the change is taken for motion, 0 to 1."""
-    smoke: npt.NDArray[np.bool_]
+    smoke: Mask
     """(nx, ny, nz) bool: where there is smoke."""
     scale: float
     """Density gradient that divides all of it: the root mean square in the smoke."""
@@ -180,7 +180,7 @@ def gradient(cells: Array) -> Faces:
     return x, y, z
 
 
-def _rms_gradient(components: Faces, smoke: npt.NDArray[np.bool_]) -> float:
+def _rms_gradient(components: Faces, smoke: Mask) -> float:
     """Root mean square of a gradient in the smoke; 0 where there is none."""
     count = np.count_nonzero(smoke)
     squares = sum(float(np.sum(np.square(g[smoke]), dtype=np.float64)) for g in components)
@@ -254,7 +254,7 @@ def fit_center(
     return grid.with_faces(own + np.float32(trust) * predicted for own, predicted in faces), trust, dissipation
 
 
-def _set_in_motion(density: Array, momentum: npt.NDArray[np.float64], grid: StaggeredGrid) -> StaggeredGrid:
+def _set_in_motion(density: Array, momentum: Doubles, grid: StaggeredGrid) -> StaggeredGrid:
     """The motion P(m) in voxels per frame that a momentum (1 or 4, 3) in the smoke sets off.
 
     It is in voxels per frame at density 1: constant, and along x, y, z, for each component.
@@ -271,7 +271,7 @@ def _set_in_motion(density: Array, momentum: npt.NDArray[np.float64], grid: Stag
     return without_divergence(grid.with_faces(faces))[0]
 
 
-def _weighted_products(columns: list[Array], weight: Array) -> npt.NDArray[np.float64]:
+def _weighted_products(columns: list[Array], weight: Array) -> Doubles:
     """Sums over the voxels of weight a b for all pairs of the columns, shape (columns, columns)."""
     products = np.zeros((len(columns), len(columns)))
     for slabs in zip(weight, *columns, strict=True):
@@ -281,7 +281,7 @@ def _weighted_products(columns: list[Array], weight: Array) -> npt.NDArray[np.fl
     return products
 
 
-def _fitted(products: npt.NDArray[np.float64]) -> tuple[npt.NDArray[np.float64], float]:
+def _fitted(products: Doubles) -> tuple[Doubles, float]:
     """The factors x that make |offset + columns . x|^2 least, and what is left of it.
 
     ``products`` are those of all columns, the last one the offset.
