@@ -29,6 +29,7 @@ from smokelift.density.observation import ObservedView, ViewSet
 from smokelift.footage.images import area_average
 from smokelift.render import Image, Renderer, Volume
 from smokelift.scene.domain import box_around
+from smokelift.transport import halved
 
 MIN_INSIDE = 0.3
 """Lower bound of the fraction of a ray's smoke that is taken to lie inside the domain. With less, smoke that the prior
@@ -153,7 +154,7 @@ class Level:
     def coarse_means(self, density: Volume) -> Volume:
         """Means of a density of this grid on the coarser one."""
         fine, coarse = self._boxes()
-        means = np.zeros(self._coarse.views.hull.shape, np.float32)
+        means = np.zeros(halved(density.shape), np.float32)
         means[coarse] = _core.means_of_two(density[fine], self.views.hull[fine])
         return means
 
@@ -165,12 +166,6 @@ class Level:
         box = box_around(self.views.hull, round(BLUR_REACH * deviation))
         return _blurred(values[box], self.views.hull[box], deviation)
 
-    @property
-    def _coarse(self) -> Level:
-        """The coarser level, where there is one."""
-        assert self.coarser is not None
-        return self.coarser
-
     @cached_property
     def _box(self) -> tuple[slice, slice, slice]:
         """The box around the smoke."""
@@ -178,7 +173,8 @@ class Level:
 
     def _boxes(self) -> tuple[tuple[slice, ...], tuple[slice, ...]]:
         """The box around the smoke on this grid and on the coarser one."""
-        coarse, shape = self._coarse._box, self.views.hull.shape
+        assert self.coarser is not None
+        coarse, shape = self.coarser._box, self.views.hull.shape
         fine = tuple(
             slice(2 * span.start, min(2 * span.stop, count)) for span, count in zip(coarse, shape, strict=True)
         )

@@ -210,8 +210,7 @@ class ViewSet:
     """All views of one moment, the input's first.
 
     `hull` (nx, ny, nz) marks the voxels that may hold smoke: those that all of them allow, or fewer where a depth prior
-    expects none (`DepthEstimate.views`). `frame` is the number of the moment in
-    its clip, from 0: a depth prior that has seen the clip knows the other moments.
+    expects none (`DepthEstimate.views`). `frame` is the number of the moment in its clip, from 0.
     """
 
     views: tuple[ObservedView, ...]
@@ -258,12 +257,12 @@ def _against_grid(
     """A picture, faded to its background, against the grid of `optics.domain`."""
     mask = probability > 0
     projection = project_voxels(camera, optics.domain)
-    depth = apparent_optical_depth(image, background, noise, mask, optics)
+    depth = _apparent_optical_depth(image, background, noise, mask, optics)
     influenced = reached(mask, projection)
     return ObservedView(camera, image, background, noise, left_out, probability, mask, depth, projection, influenced)
 
 
-def apparent_optical_depth(image: Image, background: Image, noise: Image, mask: Mask, optics: Optics) -> Array:
+def _apparent_optical_depth(image: Image, background: Image, noise: Image, mask: Mask, optics: Optics) -> Array:
     """Optical depth (rows, columns) of smoke without shadows that explains a picture: I = J (1 - T) + T B.
 
     J is the source radiance of smoke in the middle of the domain, B the background. T is the least squares solution
@@ -271,10 +270,8 @@ def apparent_optical_depth(image: Image, background: Image, noise: Image, mask: 
     although J is brighter than B. Only smoke in its own shadow does so. Such a pixel counts as thick as can be shown: a
     fit that starts from less thins it out until nothing is left (docs/experiments/thick-smoke.md).
     """
-    source = np.zeros(3)
-    if optics.scattering != "absorption":
-        source = optics.unshadowed_source()
-    source = _in_channels(source, image)
+    shines = optics.scattering != "absorption"
+    source = _in_channels(optics.unshadowed_source() if shines else np.zeros(3), image)
     contrast = background - source
     if image.shape[-1] > 3:  # shadows do not matter to the last channel
         image, contrast, source = image[..., 3:], contrast[..., 3:], source[3:]

@@ -97,7 +97,7 @@ def prepare(before: Array, after: Array) -> PreparedPair:
         smoke = second > SMOKE_THRESHOLD * second.max()
         raw = float(np.hypot(_noise_level(first, smoke), _noise_level(second, smoke)))
         first, second, left = blurred(first, width), blurred(second, width), raw * _passed(width)
-        if left <= allowed * _rms_gradient(gradient(second), smoke):
+        if left <= allowed * _rms_gradient(_gradient(second), smoke):
             break
     return PreparedPair(first, second, left**2, reduced)
 
@@ -162,7 +162,7 @@ def linearize(before: Array, after: Array, weight: Array, u: StaggeredGrid) -> L
     carried = _core.advect_cells(before, u.faces, False, True)
     density = np.maximum(carried, after)
     smoke = density > np.float32(SMOKE_THRESHOLD) * density.max()
-    direction = gradient(np.float32(0.5) * (carried + after))
+    direction = _gradient(np.float32(0.5) * (carried + after))
     scale = _rms_gradient(direction, smoke)
     if scale == 0:
         return None
@@ -174,7 +174,7 @@ def linearize(before: Array, after: Array, weight: Array, u: StaggeredGrid) -> L
     return Linearization(direction, offset, carried, np.ascontiguousarray(weight), smoke, scale)
 
 
-def gradient(cells: Array) -> Faces:
+def _gradient(cells: Array) -> Faces:
     """Central differences (nx, ny, nz) at voxel centers along x, y and z, one-sided at the sides of the box."""
     x, y, z = (np.gradient(cells, axis=axis) if cells.shape[axis] > 1 else np.zeros_like(cells) for axis in range(3))
     return x, y, z

@@ -104,27 +104,19 @@ def coarsen_velocity(velocity: Velocity) -> Velocity:
     return Velocity((x, y, z), 2 * velocity.voxel_size, velocity.closed)
 
 
-def refine(coarse: Velocity, shape: tuple[int, int, int]) -> Velocity:
+def refine(coarse: Velocity, shape: tuple[int, int, int], box: VoxelBox | None = None) -> Velocity:
     """A velocity refined to the grid (shape) that its own was halved from; itself if it is on that already.
 
-    It has no divergence there.
+    It has no divergence there. In a box of its voxels it is the same, as the velocity of a box of its own.
     """
     if coarse.shape == shape:
-        return coarse
-    x, y, z = (slice(0, count) for count in shape)
-    return refine_in_box(coarse, shape, (x, y, z))
-
-
-def refine_in_box(coarse: Velocity, shape: tuple[int, int, int], box: VoxelBox) -> Velocity:
-    """What `refine` gives in a box of its voxels, as the velocity of a box of its own."""
-    if coarse.shape == shape:
-        return part_of(coarse, box)
-    half = halved(shape)
+        return coarse if box is None else part_of(coarse, box)
+    half, box = halved(shape), box or (slice(0, shape[0]), slice(0, shape[1]), slice(0, shape[2]))
     x, y, z = (
         slice(max(side.start // 2 - REACH, 0), min((side.stop + 1) // 2 + REACH, count))
         for side, count in zip(box, half, strict=True)
     )
-    part = refine_in_box(coarse, half, (x, y, z))
+    part = refine(coarse, half, (x, y, z))
     counts = tuple(min(2 * side.stop, end) - 2 * side.start for side, end in zip((x, y, z), shape, strict=True))
     fine = Velocity(prolong(part, counts), part.voxel_size / 2, part.closed, figures=part.figures)
     i, j, k = (
@@ -143,7 +135,7 @@ def advect_near(density: Array, velocity: Velocity, dt: float, voxel_size: float
     x, y, z = density.shape
     result = np.zeros(density.shape, np.float32)
     for box, source in _boxes(density > 0, _reach(velocity, dt / voxel_size), whole=conserve):
-        along = refine_in_box(velocity, (x, y, z), source)
+        along = refine(velocity, (x, y, z), source)
         moved = advect(density[source], along, dt, conserve=conserve)
         inner = moved[tuple(slice(a.start - b.start, a.stop - b.start) for a, b in zip(box, source, strict=True))]
         # memory is given where something is written: where the smoke is, not all over its box
@@ -162,7 +154,7 @@ def refine_near_smoke(velocity: Velocity, smoke: Mask, dt: float, voxel_size: fl
         return velocity
     i, j, k = (np.zeros(shape, np.float32) for shape in face_shapes(smoke.shape))
     for box, _ in _boxes(smoke, _reach(velocity, dt / voxel_size)):
-        part = refine_in_box(velocity, (x, y, z), box)
+        part = refine(velocity, (x, y, z), box)
         for component, found in zip(faces_in((i, j, k), box), part.faces, strict=True):
             component[...] = found
     return Velocity((i, j, k), voxel_size, velocity.closed, figures=velocity.figures)
