@@ -4,7 +4,7 @@
       lights            all as directional and point lights          environment
     Optics -> Renderer  one camera before one background             renderer
       RenderPlan        rays and light sweeps in voxel coordinates   plan
-      Backend           light to every voxel, then along the rays    cpu_backend (cpp/) or gpu/ (Taichi), by device
+      Backend           light to every voxel, then along the rays    cpu_backend (cpp/) or gpu_backend, by device
 
 `render` and `render_gradient` go all the way from a density and a scene (``image``).
 """

@@ -24,7 +24,7 @@ from smokelift.scene import SHADOWED, Camera, Domain, FiniteLight, Medium, Point
 from smokelift.scene.domain import box_around
 
 if TYPE_CHECKING:
-    from smokelift.render.gpu.backend import GpuBackend
+    from smokelift.render.gpu_backend import GpuBackend
 
 Image = NDArray[np.float32]
 Volume = NDArray[np.float32]
@@ -155,6 +155,6 @@ def _backend(plan: RenderPlan) -> CpuBackend | GpuBackend:
     """What renders a plan on the device of this process."""
     if device.start() == "cpu":
         return CpuBackend(plan)
-    from smokelift.render.gpu.backend import GpuBackend  # here, because Taichi takes long to import
+    from smokelift.render.gpu_backend import GpuBackend  # here, because Taichi takes long to import
 
     return GpuBackend(plan)
