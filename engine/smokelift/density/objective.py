@@ -154,7 +154,7 @@ class Level:
     def coarse_means(self, density: Volume) -> Volume:
         """Means of a density of this grid on the coarser one."""
         fine, coarse = self._boxes()
-        means = np.zeros(halved(density.shape), np.float32)
+        means = np.zeros(halved(self.views.optics.domain.resolution), np.float32)
         means[coarse] = _core.means_of_two(density[fine], self.views.hull[fine])
         return means
 
