@@ -9,14 +9,7 @@ from smokelift import Velocity, _core, estimate_velocity
 from smokelift.baselines.paper_method import PaperVelocity
 from smokelift.scene import SIDES, Camera, Domain
 from smokelift.transport import divergence, face_shapes
-from smokelift.velocity import (
-    CoarseToFine,
-    DensityPair,
-    PicturePair,
-    ProjectedCG,
-    VelocitySettings,
-    predict_velocity,
-)
+from smokelift.velocity import CoarseToFine, DensityPair, PicturePair, ProjectedCG, VelocitySettings, predict_velocity
 from smokelift.velocity.coarse_to_fine import ONE_VIEW_SMOOTHNESS
 from smokelift.velocity.optical_flow import correct_by_optical_flow
 from smokelift.velocity.pyramid import refine
