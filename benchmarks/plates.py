@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 from scipy import ndimage
 
-from smokelift.footage.images import Picture, area_average, linear_to_srgb, read_image, srgb_to_linear
+from smokelift.footage.image_files import read_image
+from smokelift.footage.images import Picture, area_average, linear_to_srgb, srgb_to_linear
 
 BRIGHT = 0.75
 """Linear radiance of the bright sky."""

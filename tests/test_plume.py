@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 
 from smokelift.footage.clip import Clip
-from smokelift.footage.images import area_average, read_image
+from smokelift.footage.image_files import read_image
+from smokelift.footage.images import area_average
 from smokelift.scene import Scene
 
 SMALL = Path(__file__).parent / "plume"

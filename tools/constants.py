@@ -30,7 +30,7 @@ SWEEPS = {
     "planks sky --known given frame unknown --black`; other plates and the matte: `python -m benchmarks.background "
     "SCENES/plume-1 SCENES/jet-2`. No benchmark moves a camera or burns.",
     "footage": "Noise and exposure: `python -m benchmarks.disturbances OUT SCENES/plume-1 --only noise crf flicker "
-    "flicker-gray --methods default`; `inpainting`: as `extraction`. No benchmark moves limits of files and memory.",
+    "flicker-gray --methods default`; `images`: as `extraction`. No benchmark moves limits of files and memory.",
     "output": "No benchmark moves them: formats, limits of files, and how pictures are laid out.",
     "render": "`python -m benchmarks.renderer.agreement --mitsuba PYTHON`",
     "report": "No benchmark moves them: they lay a page out, and say when something is said.",

@@ -13,7 +13,7 @@ from smokelift import Camera, Clip, Scene
 from smokelift.evaluation.truth import Truth
 from smokelift.footage.images import area_average
 from smokelift.render import Image
-from smokelift.scene.projection import project_points, ray_through_pixels
+from smokelift.scene.camera import project_points, ray_through_pixels
 
 REAL_SIZE = (270, 480)
 """Columns and rows at which pictures of the ScalarFlow capture are compared."""

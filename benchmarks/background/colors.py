@@ -17,7 +17,7 @@ from smokelift.checks import UNDETERMINED, Doubles
 from smokelift.extraction.plate import known_plate
 from smokelift.footage.images import Picture
 from smokelift.setup.first_estimate import sample_smoke
-from smokelift.setup.medium import smoke_color
+from smokelift.setup.illumination import smoke_color
 
 LIGHTS = {"white": (1.0, 1.0, 1.0), "4 degrees warm": (1.0, 0.93, 0.84), "10 degrees warm": (1.0, 0.82, 0.64)}
 COLORS = {

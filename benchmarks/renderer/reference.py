@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from benchmarks.renderer.scene import BenchScene
 from smokelift.checks import Doubles
-from smokelift.scene.projection import ray_through_pixels
+from smokelift.scene.camera import ray_through_pixels
 
 
 def image_and_gradient(scene: BenchScene) -> tuple[Doubles, Doubles]:

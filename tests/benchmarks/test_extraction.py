@@ -11,7 +11,8 @@ from benchmarks.extraction.__main__ import main
 from benchmarks.extraction.compose import FRAME, GIVEN, KNOWN, UNKNOWN, Composed, Filming, compose
 from benchmarks.extraction.score import score_densities, score_element
 from smokelift import Background, Clip, Scene
-from smokelift.footage.images import linear_to_srgb, read_image
+from smokelift.footage.image_files import read_image
+from smokelift.footage.images import linear_to_srgb
 from smokelift.render import scene_renderer
 from smokelift.scene import completed, orbit
 from tests.benchmarks.ball import scene, truth

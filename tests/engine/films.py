@@ -13,7 +13,8 @@ from smokelift.extraction.find_background import find_background
 from smokelift.extraction.plate import Plate
 from smokelift.footage.clip import Clip
 from smokelift.footage.frame_source import FrameSource, StoredPicture
-from smokelift.footage.images import code_values, linear_to_srgb, srgb_to_linear
+from smokelift.footage.image_files import code_values
+from smokelift.footage.images import linear_to_srgb, srgb_to_linear
 from smokelift.footage.noise import lasting_noise
 from smokelift.output.images import write_image
 

@@ -5,7 +5,7 @@ Like ``renderer_reference`` it takes complex densities, for derivatives by a com
 
 import numpy as np
 
-from smokelift.scene.projection import ray_through_pixels
+from smokelift.scene.camera import ray_through_pixels
 from tests.engine.renderer_reference import inscatter_of
 
 

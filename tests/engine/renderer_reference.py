@@ -7,7 +7,7 @@ differences of two pictures can resolve.
 
 import numpy as np
 
-from smokelift.scene.projection import ray_through_pixels
+from smokelift.scene.camera import ray_through_pixels
 
 
 def _interpolate(plane, b, c):

@@ -18,7 +18,7 @@ from PIL import Image
 from smokelift import Background, Camera, Clip, ClipSource, DirectionalLight, Domain, Sequence
 from smokelift.evaluation.truth import Truth, TruthError
 from smokelift.footage.frame_source import ClipError
-from smokelift.footage.images import ImageError, read_image
+from smokelift.footage.image_files import ImageError, read_image
 from smokelift.output.archive import VELOCITY, read_arrays, write_arrays
 from smokelift.output.files import INDEX
 from smokelift.output.images import write_image

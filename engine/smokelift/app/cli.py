@@ -18,7 +18,7 @@ from smokelift.app.commands import COMMANDS
 from smokelift.app.options import add_device, whole_number
 from smokelift.app.progress import OutputError, reporter
 from smokelift.checks import printable
-from smokelift.footage.images import READABLE
+from smokelift.footage.image_files import READABLE
 from smokelift.output.files import DISK_FULL
 from smokelift.output.index import DirectoryBusyError
 from smokelift.output.vdb import VdbUnavailable

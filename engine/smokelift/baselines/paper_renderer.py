@@ -40,7 +40,7 @@ from smokelift.render.gpu_backend import LightSweeps
 from smokelift.render.plan import ParallelSweep
 from smokelift.render.renderer import Image, Optics, Volume
 from smokelift.scene import Camera, Domain
-from smokelift.scene.projection import ray_through_pixels
+from smokelift.scene.camera import ray_through_pixels
 
 
 class PaperRenderer:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from smokelift.checks import shown
-from smokelift.scene.toml_files import Place, TomlFile, read_toml
+from smokelift.scene.scene_file import Place, TomlFile, read_toml
 
 OPTIONS = (
     *("quality", "method", "resolution", "scattering", "frames", "mask"),

@@ -34,7 +34,7 @@ from smokelift.density.upright_plane import (
 )
 from smokelift.extraction.matte import matte
 from smokelift.scene import Camera, Domain, Inlet
-from smokelift.scene.projection import ray_through_pixels
+from smokelift.scene.camera import ray_through_pixels
 
 FRAMES = 16
 """Number of frames of a clip from which the axis is estimated."""

@@ -12,7 +12,7 @@ from scipy import ndimage
 import smokelift._core as _core
 from smokelift.checks import Array, Mask
 from smokelift.scene import Camera, Domain
-from smokelift.scene.projection import world_to_pixel
+from smokelift.scene.camera import world_to_pixel
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,8 +22,8 @@ from smokelift.footage.images import area_average, channel_mean
 from smokelift.footage.noise import EIGHT_BIT_NOISE
 from smokelift.render import Image, Optics, Renderer, Volume
 from smokelift.scene import SHADOWED, Camera, Domain, Inlet
+from smokelift.scene.camera import voxel_width
 from smokelift.scene.checks import LARGEST
-from smokelift.scene.projection import voxel_width
 
 THINNEST_CLEAR = 0.05
 """Lower bound of the transmittance: a brightness does not show an optical depth above 3."""

@@ -14,7 +14,7 @@ from scipy import ndimage
 
 from smokelift.checks import Array, Doubles, Mask
 from smokelift.scene import Camera, Domain
-from smokelift.scene.projection import project_points, ray_through_pixels
+from smokelift.scene.camera import project_points, ray_through_pixels
 
 TINY_DOUBLE = np.finfo(np.float64).tiny
 """Smallest normal number, for divisions."""

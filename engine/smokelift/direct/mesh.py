@@ -15,7 +15,7 @@ import numpy.typing as npt
 from scipy import ndimage
 
 from smokelift.checks import Doubles, Mask
-from smokelift.footage.image_sequence import is_pattern, numbered_files
+from smokelift.footage.frame_source import is_pattern, numbered_files
 from smokelift.scene import Domain
 from smokelift.scene.checks import LARGEST, Vector, set_fields
 from smokelift.transport import Array, Faces

@@ -28,14 +28,19 @@ from smokelift.extraction.proxy import Proxy
 from smokelift.footage.clip import Clip
 from smokelift.footage.frame_source import Edges
 from smokelift.footage.images import (
+    DETAIL,
+    ISLAND,
     Picture,
     area_average,
     blurred,
     brightest_channel,
+    in_one_piece,
+    left_out_parts,
     linear_to_srgb,
+    mostly_beside,
+    push_pull,
     srgb_to_linear,
 )
-from smokelift.footage.inpainting import DETAIL, ISLAND, in_one_piece, left_out_parts, mostly_beside, push_pull
 from smokelift.footage.noise import EIGHT_BIT_STEP, Noise, at_rank, count_of_seen, median_of_seen, peak_spread
 
 WINDOW = 6.0

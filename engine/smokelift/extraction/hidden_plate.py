@@ -20,7 +20,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.checks import Mask
-from smokelift.extraction.background_kind import OBJECT
 from smokelift.extraction.element import (
     BRIGHTNESS_RANGE,
     MAX_CELLS,
@@ -34,6 +33,7 @@ from smokelift.extraction.element import (
     source_in,
     source_of,
 )
+from smokelift.extraction.find_background import OBJECT
 from smokelift.extraction.plate import Plate, resized
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import Picture, area_average, blurred, reduced_size

@@ -11,18 +11,19 @@ import numpy as np
 import numpy.typing as npt
 
 from smokelift.footage.clip import Clip
-from smokelift.footage.exposure import gain_of, small
-from smokelift.footage.image_sequence import is_video
+from smokelift.footage.frame_source import is_video
 from smokelift.footage.images import Picture, area_average, brightest_channel, linear_to_srgb, srgb_to_linear
 from smokelift.footage.noise import (
     EIGHT_BIT_STEP,
     Noise,
     block_means,
     clipped_black,
+    gain_of,
     lasting_noise,
     linear_excess,
     linear_per_srgb,
     noise_about,
+    small,
     some_blocks,
 )
 from smokelift.footage.video import median_quantizer

@@ -16,11 +16,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.footage.clip import Clip
-from smokelift.footage.exposure import gain_of, sample_gains, small
 from smokelift.footage.frame_source import ClipError, StoredPicture
 from smokelift.footage.images import Picture, brightest_channel, linear_to_srgb, reduced_size
 from smokelift.footage.mask import Seen
-from smokelift.footage.noise import Noise, noise_of, some_blocks, spread_about, white_noise
+from smokelift.footage.noise import (
+    Noise,
+    gain_of,
+    noise_of,
+    sample_gains,
+    small,
+    some_blocks,
+    spread_about,
+    white_noise,
+)
 
 PROXY_SIDE = 480
 """Pixels along the longer side: lengths in `clear_picture` hold at some hundred (docs/experiments/background.md)."""

@@ -12,11 +12,18 @@ from typing import Any, TypeVar
 import numpy as np
 
 from smokelift.checks import Finding
-from smokelift.footage.exposure import COMPARED_SIDE
-from smokelift.footage.frame_source import ClipError, DamagedFrameError, FrameSource, StoredPicture
-from smokelift.footage.image_sequence import ImageSequence, is_video
-from smokelift.footage.images import Picture, Transfer, reduced_size
+from smokelift.footage.frame_source import (
+    ClipError,
+    DamagedFrameError,
+    FrameSource,
+    ImageSequence,
+    StoredPicture,
+    is_video,
+)
+from smokelift.footage.image_files import Transfer
+from smokelift.footage.images import Picture, reduced_size
 from smokelift.footage.mask import Mask, Seen
+from smokelift.footage.noise import COMPARED_SIDE
 from smokelift.footage.registration import IDENTITY, Read, Similarity, registered, registered_mask
 from smokelift.footage.video import Video
 from smokelift.scene import ClipSource, SceneError

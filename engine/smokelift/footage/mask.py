@@ -17,10 +17,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
 
-from smokelift.footage.frame_source import ClipError, StoredPicture
-from smokelift.footage.image_sequence import is_pattern, is_video, numbered_files
-from smokelift.footage.images import LUMINANCE, Picture, area_average, read_image, reduced_size
-from smokelift.footage.inpainting import push_pull
+from smokelift.footage.frame_source import ClipError, StoredPicture, is_pattern, is_video, numbered_files
+from smokelift.footage.image_files import read_image
+from smokelift.footage.images import LUMINANCE, Picture, area_average, push_pull, reduced_size
 from smokelift.footage.video import Video
 
 CONTINUED_SIDE = 320

@@ -4,7 +4,7 @@ The container is first read through, without decoding, for the times of all fram
 frames in a row cost one decode each.
 
 What a file says of its pictures is applied: matrix and range by FFmpeg's converter (an untagged video is read as
-BT.601, as FFmpeg writes one), transfer and primaries (`color`), rotation and mirroring, the shape of pixels,
+BT.601, as FFmpeg writes one), transfer and primaries (`image_files`), rotation and mirroring, the shape of pixels,
 interlacing (one field of each frame is used) and alpha. The converter is set to round exactly: by default it is half an
 8 bit step too dark.
 
@@ -26,22 +26,23 @@ from av.sidedata.sidedata import Type as SideData
 from av.video.reformatter import ColorRange, Interpolation
 
 from smokelift.checks import Finding
-from smokelift.footage.color import ENCODINGS, PRIMARIES, Encoding, to_bt709
 from smokelift.footage.frame_source import DEFAULT_FPS, ClipError, DamagedFrameError, FrameSource, StoredPicture
-from smokelift.footage.images import (
+from smokelift.footage.image_files import (
     DECODERS,
+    ENCODINGS,
+    PRIMARIES,
+    Encoding,
     Layer,
-    Picture,
     Transfer,
     code_values,
     decode,
     encoded_values,
-    linear_to_srgb,
     open_container,
     readable_size,
     require_size,
-    srgb_to_linear,
+    to_bt709,
 )
+from smokelift.footage.images import Picture, linear_to_srgb, srgb_to_linear
 
 _EXACT = int(Interpolation.ACCURATE_RND | Interpolation.FULL_CHR_H_INT | Interpolation.FULL_CHR_H_INP)
 _GROWING, _SHRINKING = int(Interpolation.BICUBIC) | _EXACT, int(Interpolation.AREA) | _EXACT

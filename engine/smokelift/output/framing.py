@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from smokelift.output.sequence import Sequence
 from smokelift.scene import Camera, Domain, orbit
-from smokelift.scene.projection import project_points
+from smokelift.scene.camera import project_points
 
 MIN_VISIBLE_DEPTH = 0.01
 """Optical depth from which smoke is seen: it changes what is behind it by as much, which is a step or two of 8 bits."""

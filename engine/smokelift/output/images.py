@@ -14,7 +14,8 @@ import OpenEXR
 from PIL import Image, ImageDraw
 
 from smokelift.checks.whole_files import atomic_path
-from smokelift.footage.images import ImageError, linear_to_srgb
+from smokelift.footage.image_files import ImageError
+from smokelift.footage.images import linear_to_srgb
 from smokelift.output.files import DISK_FULL
 
 Tile = npt.NDArray[np.uint8]

@@ -10,7 +10,7 @@ from smokelift.extraction.find_background import find_background
 from smokelift.extraction.hidden_plate import plate_and_source
 from smokelift.extraction.plate import Plate, cleared
 from smokelift.footage.clip import Clip
-from smokelift.footage.image_sequence import is_pattern
+from smokelift.footage.frame_source import is_pattern
 from smokelift.footage.images import Picture
 from smokelift.output.images import write_image
 from smokelift.scene import Scene

@@ -18,10 +18,11 @@ from itertools import pairwise
 import numpy as np
 
 from smokelift.checks import Array, Doubles, Indices
-from smokelift.footage.images import LUMINANCE, ImageError, read_image
+from smokelift.footage.image_files import ImageError, read_image
+from smokelift.footage.images import LUMINANCE
 from smokelift.render.renderer import Image, Optics, Volume
 from smokelift.scene import Camera, CompleteScene, DirectionalLight, Domain, EnvironmentLight, FiniteLight, Medium
-from smokelift.scene.projection import voxel_width
+from smokelift.scene.camera import voxel_width
 
 CELLS = (256, 512)
 """Rows and columns of the cells that strata are made of, 0.7 degrees: a sun is one to four of them."""

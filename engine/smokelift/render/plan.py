@@ -22,9 +22,9 @@ from numpy.typing import NDArray
 
 from smokelift.checks import Array, Doubles
 from smokelift.scene import Camera, DirectionalLight, Domain, FiniteLight, Medium, PointLight
+from smokelift.scene.camera import world_to_pixel
 from smokelift.scene.checks import Vector
 from smokelift.scene.domain import LATERAL
-from smokelift.scene.projection import world_to_pixel
 
 Voxel = tuple[int, int, int]
 Shape = tuple[int, int, int]

@@ -22,7 +22,7 @@ import scipy.fft
 from smokelift.density import RoundDepth, ViewSet
 from smokelift.density.objective import MIN_COARSENED_VOXELS
 from smokelift.setup.first_estimate import SAMPLE_FRAMES
-from smokelift.setup.resolution import Shape, proportional
+from smokelift.setup.geometry import Shape, proportional
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from smokelift.checks import Figure, Figures, Finding, Source
-from smokelift.footage.exposure import shows_exposure, small
+from smokelift.footage.noise import shows_exposure, small
 from smokelift.report.cost import Cost, Workload, estimate_cost
 from smokelift.report.views import fact
 from smokelift.scene import CompleteScene, Scene

@@ -13,7 +13,7 @@ from smokelift.footage.images import linear_to_srgb
 from smokelift.output.images import Tile, eight_bit
 from smokelift.report.page import TILE, Color, Page, Panel, tile_size
 from smokelift.scene import SHADOWED, Camera, DirectionalLight, Domain, PointLight, Scene
-from smokelift.scene.projection import project_points
+from smokelift.scene.camera import project_points
 from smokelift.setup.first_estimate import unknown_part
 from smokelift.setup.shot import Shot
 

@@ -7,9 +7,18 @@ from smokelift.scene.camera import LARGEST_PICTURE, Camera, as_matrix, look_at_m
 from smokelift.scene.checks import SceneError
 from smokelift.scene.description import CompleteScene, Scene, completed, require_scene, scene_from_dict
 from smokelift.scene.domain import SIDES, Box, Domain, Inlet, Side
-from smokelift.scene.lights import DirectionalLight, EnvironmentLight, FiniteLight, Light, PointLight
-from smokelift.scene.medium import SCATTERINGS, SHADOWED, Medium, Scattering
-from smokelift.scene.tables import scene_to_dict
+from smokelift.scene.lights import (
+    SCATTERINGS,
+    SHADOWED,
+    DirectionalLight,
+    EnvironmentLight,
+    FiniteLight,
+    Light,
+    Medium,
+    PointLight,
+    Scattering,
+)
+from smokelift.scene.scene_file import scene_to_dict
 from smokelift.scene.view import Background, ClipSource, View
 
 __all__ = [

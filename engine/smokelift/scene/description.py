@@ -5,7 +5,7 @@ Image coordinates are in pixels, x to the right and y down from the top left cor
 integers. Directions of lights are directions of travel.
 
 Every class of a scene checks its values where it is made, so a scene built in Python and one read from a file are
-refused for the same reasons; `smokelift.scene.tables` adds the file and the line to the message.
+refused for the same reasons; `smokelift.scene.scene_file` adds the file and the line to the message.
 """
 
 from collections.abc import Mapping, Sequence
@@ -16,14 +16,11 @@ from typing import Any
 import numpy as np
 
 from smokelift.checks import Mask, listed, one_of, require_kind, shown
-from smokelift.scene.camera import Camera
+from smokelift.scene.camera import Camera, sees
 from smokelift.scene.checks import SceneError, file_path, integer, set_fields, unexpected
 from smokelift.scene.domain import Box, Domain, Inlet, Side, checked_sides
-from smokelift.scene.lights import EnvironmentLight, Light, PointLight
-from smokelift.scene.medium import SCATTERINGS, Medium, Scattering
-from smokelift.scene.projection import sees
-from smokelift.scene.tables import from_tables, scene_to_dict
-from smokelift.scene.toml_files import TomlFile, read_toml, write_toml
+from smokelift.scene.lights import SCATTERINGS, EnvironmentLight, Light, Medium, PointLight, Scattering
+from smokelift.scene.scene_file import TomlFile, from_tables, read_toml, scene_to_dict, write_toml
 from smokelift.scene.view import Background, ClipSource, View
 
 MAX_LISTED = 256

@@ -1,12 +1,24 @@
-"""The kinds of light. A new one has a class here and an entry in `LIGHT_TYPES`."""
+"""Light, and what smoke does to it. A new kind of light has a class here and an entry in `LIGHT_TYPES`."""
 
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Literal, Protocol, runtime_checkable
 
 from smokelift.checks import shown
-from smokelift.scene.checks import SceneError, Vector, color, file_path, integer, number, set_fields, unexpected, vector
+from smokelift.scene.checks import (
+    SceneError,
+    Vector,
+    check_given,
+    color,
+    file_path,
+    integer,
+    number,
+    positive,
+    set_fields,
+    unexpected,
+    vector,
+)
 from smokelift.scene.domain import Box, Domain
 
 MAX_DISTANCE_VOXELS = 1e6
@@ -14,6 +26,14 @@ MAX_DISTANCE_VOXELS = 1e6
 
 MAX_DIRECTIONS = 4096
 """Parallel lights that stand for one environment, at most: every picture sweeps the voxels once for each."""
+
+Scattering = Literal["multiple", "single", "unshadowed", "absorption"]
+"""How light is scattered: any number of times, once and with self-shadowing, once without, or not at all."""
+
+SCATTERINGS: tuple[Scattering, ...] = ("multiple", "single", "unshadowed", "absorption")
+
+SHADOWED: tuple[Scattering, ...] = ("multiple", "single")
+"""Models of scattering in which smoke casts shadows on itself."""
 
 
 @dataclass(frozen=True)
@@ -137,3 +157,60 @@ LIGHT_TYPES: dict[str, type[Any]] = {
     "environment": EnvironmentLight,
 }
 """The frozen dataclass of each ``type`` that [[lights]] may have; its fields are the keys of the table."""
+
+
+@dataclass(frozen=True)
+class Medium:
+    """Optical properties of the smoke.
+
+    Attributes
+    ----------
+    extinction
+        Extinction cross-section, 1/m per unit density.
+    albedo
+        Single-scattering albedo, 0 to 1.
+    anisotropy
+        Henyey-Greenstein g, -1 < g < 1.
+    color
+        Color of the smoke itself, red, green and blue from 0 to 1. Each channel's albedo is ``albedo`` times this.
+        Extinction is the same for all.
+    flame_color
+        Color of the light of fire in the smoke, red, green and blue from 0 to 1. Times the emission in the grid
+        ``flame`` it is the radiance per meter. What may be fire is fire then. None takes what the clip shows.
+    """
+
+    extinction: float = 5.0
+    albedo: float = 0.9
+    anisotropy: float = 0.0
+    color: Vector = (1.0, 1.0, 1.0)
+    flame_color: Vector | None = None
+
+    def __post_init__(self) -> None:
+        set_fields(
+            self,
+            extinction=positive(self.extinction, "extinction"),
+            albedo=number(self.albedo, "albedo", "a number from 0 to 1", lambda v: 0.0 <= v <= 1.0),
+            anisotropy=number(self.anisotropy, "anisotropy", "a number between -1 and 1", lambda v: -1.0 < v < 1.0),
+            color=_fractions(self.color, "color"),
+        )
+        check_given(self, flame_color=_fractions)
+
+    @property
+    def albedos(self) -> Vector:
+        """Single-scattering albedo of red, green and blue."""
+        red, green, blue = self.color
+        return self.albedo * red, self.albedo * green, self.albedo * blue
+
+    @property
+    def is_gray(self) -> bool:
+        """Whether the smoke scatters red, green and blue alike."""
+        return min(self.color) == max(self.color)
+
+
+def _fractions(value: Any, key: str) -> Vector:
+    """Return ``value`` as fractions of red, green and blue, or raise a SceneError that names ``key``."""
+    expected = "three numbers [r, g, b] from 0 to 1, one of them above 0"
+    rgb = vector(value, key, expected)
+    if min(rgb) < 0.0 or max(rgb) > 1.0 or max(rgb) == 0.0:
+        raise unexpected(list(rgb), key, expected)
+    return rgb

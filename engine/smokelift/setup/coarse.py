@@ -20,10 +20,9 @@ from smokelift.extraction.plate import Plate
 from smokelift.footage.images import area_average
 from smokelift.render import Image, Optics, scene_optics
 from smokelift.scene import Camera, CompleteScene, Domain, Scattering
-from smokelift.scene.projection import voxel_width
-from smokelift.setup.resolution import proportional
+from smokelift.scene.camera import voxel_width
+from smokelift.setup.geometry import proportional, working_picture
 from smokelift.setup.shot import ShotView
-from smokelift.setup.working_picture import CameraError, working_picture
 
 COARSE_SIDE = 32
 """Largest number of voxels along the longest side: a few per cent of the work of 96, and every large shadow is there
@@ -95,11 +94,10 @@ def coarse_frame(views: Sequence[ShotView], number: int, scene: CompleteScene, t
 
     The grid has at most ``times`` `COARSE_SIDE` voxels along its longest side. The first view is the input.
     """
-    try:
-        pixels = voxel_width(views[0].camera.at(number), scene.domain)
-        domain = coarse_domain(scene.domain, pixels, times * COARSE_SIDE)
-        seen = tuple(_coarse_view(view, number, domain) for view in views)
-    except CameraError:
+    pixels = voxel_width(views[0].camera.at(number), scene.domain)
+    domain = coarse_domain(scene.domain, pixels, times * COARSE_SIDE)
+    seen = tuple(found for view in views if (found := _coarse_view(view, number, domain)) is not None)
+    if len(seen) < len(views):
         return None
     return CoarseFrame(number, replace(scene, camera=seen[0].camera, domain=domain), seen)
 
@@ -117,9 +115,11 @@ def coarse_domain(domain: Domain, pixels: float, most_voxels: int) -> Domain:
     return domain.with_at_most(max(most, MIN_SIDE_VOXELS))
 
 
-def _coarse_view(view: ShotView, number: int, domain: Domain) -> CoarseView:
-    """What one camera saw of a frame."""
+def _coarse_view(view: ShotView, number: int, domain: Domain) -> CoarseView | None:
+    """What one camera saw of a frame; None if that does not show the domain."""
     working = working_picture(view.camera.at(number), domain)
+    if working is None:
+        return None
     first = (working.top + working.left) % 2  # the colors are those of the whole picture's pixels
     halves = chequered(view.clip.stored(number).cut(working.part).linear(), *working.camera.size, first)
     plate = view.plate.at(number).through(working.cut, working.pixels)

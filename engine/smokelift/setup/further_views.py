@@ -16,15 +16,13 @@ from smokelift.density import ViewSet
 from smokelift.density.hull import agreement
 from smokelift.extraction.find_background import find_background
 from smokelift.footage.clip import Clip
-from smokelift.footage.image_sequence import is_video
+from smokelift.footage.frame_source import is_video
 from smokelift.scene import ClipSource, CompleteScene
-from smokelift.setup.background_findings import background_findings
 from smokelift.setup.coarse import SCATTERING_TOLERANCE, HeldOut, coarse_frames, held_out
-from smokelift.setup.first_estimate import sample_smoke, with_source
+from smokelift.setup.first_estimate import background_findings, sample_smoke, with_source
 from smokelift.setup.geometry import fitting
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot, ShotView
-from smokelift.setup.working_picture import CameraError
 
 AGREEMENT_SAMPLES = 4
 """Frames in which the views are compared: a wrong one does not decide their median."""
@@ -90,10 +88,10 @@ def _open_view(number: int, clip: Clip, scene: CompleteScene) -> tuple[ShotView,
     if background is None and scene.background.color is not None:
         background = replace(scene.background, strokes=None)
     found = find_background(view_clip, camera, background)
+    plate, source, _ = with_source(found, found.clip, sample_smoke(found.clip, found.plate))
     try:
-        plate, source, _ = with_source(found, found.clip, sample_smoke(found.clip, found.plate))
-        shown = replace(ShotView.facing(scene.domain, found.clip, camera, plate), source=source)
-    except CameraError as error:
+        shown = ShotView.facing(scene.domain, found.clip, camera, plate, source)
+    except ValueError as error:
         raise ValueError(f"View {number + 1}: {error}") from error
     axes = [np.array(each.matrix)[:3, 2] for each in (scene.camera, camera)]
     angle = np.degrees(np.arccos(np.clip(axes[0] @ axes[1], -1, 1)))

@@ -1,9 +1,15 @@
-"""The light of a shot, and how its smoke scatters it.
+"""The medium that a shot's smoke is, what color it has, the light, and how the smoke scatters it.
 
+    what the scene gives, or the color of the smoke's pixels -> the medium                              find_medium
     what the scene gives, or the smoke's source radiance -> a light, the richest scattering it allows   first_light
     coarse densities in it -> the cheapest scattering that is as good                                   find_scattering
 
-The second is judged by `coarse.held_out`. Figures: docs/selection.md.
+The last is judged by `coarse.held_out`. Figures: docs/selection.md, docs/experiments/unknown-light.md.
+
+A pixel shows T behind + (1 - T) source, where the source radiance is the light times the smoke's color. So the source
+lies on the line from the background through the smoke, beyond the thickest smoke that is seen. Before black that line
+has one color, else many. Smoke has a color of its own if no source on the line has one that light may have: white, as
+cameras balance it, or the background's, which stands in the same light.
 """
 
 from collections.abc import Callable, Sequence
@@ -11,18 +17,53 @@ from dataclasses import replace
 
 import numpy as np
 
-from smokelift.checks import UNDETERMINED, Figures, Finding
+from smokelift.checks import UNDETERMINED, Doubles, Figures, Finding
 from smokelift.extraction.element import SOURCE_SIDE, extract_element
-from smokelift.extraction.fire import MIN_COLORED_VALUE
-from smokelift.footage.images import Picture, channel_mean, reduced_size
+from smokelift.extraction.matte import CLIPPED_VALUE, MIN_COLORED_VALUE
+from smokelift.footage.images import Picture, brightest_channel, channel_mean, reduced_size
 from smokelift.footage.noise import Noise
+from smokelift.render import scene_optics
 from smokelift.render.environment import environment_count
-from smokelift.scene import SCATTERINGS, SHADOWED, DirectionalLight, EnvironmentLight, Light, Medium, Scattering
+from smokelift.scene import (
+    SCATTERINGS,
+    SHADOWED,
+    Background,
+    Camera,
+    CompleteScene,
+    DirectionalLight,
+    Domain,
+    EnvironmentLight,
+    Light,
+    Medium,
+    Scattering,
+    Scene,
+)
+from smokelift.scene.checks import Vector
 from smokelift.setup.coarse import SCATTERING_TOLERANCE, CoarseFrame, held_out
 from smokelift.setup.first_estimate import FirstEstimate, SmokeSamples
 from smokelift.setup.geometry import Geometry
-from smokelift.setup.medium import source_radiance
 from smokelift.setup.settings import Settings
+
+OPTICAL_DEPTH_AT_ONE = 5.0
+"""Optical depth across the domain of smoke of density 1 if no medium is given: thick, not solid. It is a convention,
+since a picture shows density times extinction only."""
+
+SOURCE_EXCESS = 0.1
+"""Fraction by which the source exceeds the smoke's 99th percentile, whose optical depth is then about 2.4."""
+
+MIN_COLOR_DEGREES = 12.0
+"""Degrees between two colors, as vectors of linear light, from which white balance does not explain their difference.
+Gray world and its kin are wrong by 5 to 6 degrees on the mean and by 10 in the worst quarter of pictures (Gijsenij,
+Gevers and van de Weijer, "Computational color constancy: survey and experiments", 2011)."""
+
+THICK_PERCENTILE = 90
+"""Percentile of the change from which smoke is measured: the thickest is nearest to the source."""
+
+MIN_COLOR_PIXELS = 50
+"""Smallest number of smoke pixels that show a color: their thickest tenth are five."""
+
+WHITE: Vector = (1.0, 1.0, 1.0)
+"""Color of gray smoke (by definition)."""
 
 MAX_ERROR_RATIO = 0.75
 """Error of multiple over single scattering, below which multiple is taken. It is 0.01 to 0.63 for traced paths, unless
@@ -46,6 +87,143 @@ MAX_QUIET_NOISE = 2 / 255
 LIT_PERCENTILE = 90
 """Percentile of what thick smoke sends that an assumed light has to reach: with 99 T of three composed clips is off by
 .02 to .04 more, with 75 the picture of a real one loses 2 dB (measured)."""
+
+
+def find_medium(scene: Scene, estimate: FirstEstimate, camera: Camera, domain: Domain) -> tuple[Medium, list[Finding]]:
+    """Complete the medium, with its flame's color if fire burns; return what was found of it too."""
+    medium, samples, fire = scene.medium, estimate.samples, estimate.fire
+    flame_color = None if medium is None else medium.flame_color
+    found: list[Finding] = []
+    if medium is None or (flame_color is not None and medium == Medium(flame_color=flame_color)):
+        medium = Medium(OPTICAL_DEPTH_AT_ONE / min(domain.size), flame_color=flame_color)
+        figures = {"extinction": medium.extinction, "albedo": medium.albedo}
+        found.append(Finding("assumed medium", figures, about="medium", source="assumed"))
+        color, colored = smoke_color(samples, _light_color(scene.lights, camera, domain, medium))
+        medium = replace(medium, color=color)
+        found.append(colored)
+    found += several_colors(samples)
+    if fire is not None:
+        (red, green, blue), fraction = fire.color, estimate.hot.fraction
+        figures = {"fraction": fraction, "red": red, "green": green, "blue": blue}
+        found.append(Finding("fire", figures, about="fire", value=fraction, source="measured"))
+        medium = replace(medium, flame_color=fire.color)
+    return medium, found
+
+
+def _light_color(lights: tuple[Light, ...], camera: Camera, domain: Domain, gray: Medium) -> Doubles:
+    """Color (3,) of the light in the middle of a box, the largest 1; ones where no light is known."""
+    # only the sum of an environment's directions counts, so one stands for all
+    few = tuple(replace(each, directions=1) if isinstance(each, EnvironmentLight) else each for each in lights)
+    scene = CompleteScene(
+        camera=camera, domain=domain, medium=gray, lights=few, background=Background(), scattering="single"
+    )
+    source = scene_optics(scene).unshadowed_source()
+    return source / source.max() if source.max() > 0 else np.ones(3)
+
+
+def source_radiance(samples: SmokeSamples) -> Doubles:
+    """Return the source radiance (3,) of the smoke by its brightness; white if the clip shows none.
+
+    Thick smoke shows it: the brightest if smoke brightens its background, the darkest if it darkens it.
+    """
+    if len(samples.colors) == 0:
+        return np.ones(3)
+    if not samples.brightens:
+        return np.asarray((1 - SOURCE_EXCESS) * np.percentile(samples.colors, 1, axis=0))
+    # on the line of colors: the channels' maxima may be of different smoke, and together a color that none shows
+    colors, behind = samples.colors.astype(np.float64), samples.behind.astype(np.float64)
+    axis, start = _line_of_colors(colors, behind), behind.mean(0)
+    farthest = start + (np.percentile(colors @ axis, 99) - start @ axis) * axis
+    return np.asarray(np.maximum(farthest + SOURCE_EXCESS * np.linalg.norm(farthest) * axis, 0))
+
+
+def smoke_color(samples: SmokeSamples, light: Doubles) -> tuple[Vector, Finding]:
+    """Return the smoke's own color in a light (3,), and what decided it.
+
+    An unknown light is ones. The color's largest channel is 1; it is white unless the clip shows that it is not gray.
+    """
+    figures = {"tolerance": MIN_COLOR_DEGREES}
+    undetermined = Finding("smoke color unseen", figures, about="smoke color", value=UNDETERMINED, source="assumed")
+    line = _thickest_smoke(samples)
+    if line is None:
+        return WHITE, undetermined
+    behind, seen = line
+    sources = _sources(behind, seen)
+    white = _degrees(sources, light)
+    least = np.minimum(white, _degrees(sources, behind)) if behind.max() > MIN_COLORED_VALUE else white
+    if least.min() < MIN_COLOR_DEGREES:
+        figures["degrees"] = float(least.min())
+        return WHITE, replace(undetermined, kind="smoke color near the light's", figures=figures)
+    # the palest that explains the clip
+    own = sources[white.argmin()] / np.maximum(light, 1e-6)
+    red, green, blue = (float(round(v, 3)) for v in own / own.max())
+    figures["degrees"] = float(white.min())
+    color = red, green, blue
+    return color, Finding("measured smoke color", figures, about="smoke color", value=color, source="measured")
+
+
+def several_colors(samples: SmokeSamples) -> list[Finding]:
+    """Return a doubt if smoke before black has more than one color, at a time or one after the other.
+
+    Smoke of one color has that color before black, however thick it is. So what is off the color that explains most
+    of the light is another color's. Clipped white shows none.
+    """
+    shown = samples.colors[samples.colors.min(-1, initial=1.0) < CLIPPED_VALUE].astype(np.float64)
+    if len(shown) < MIN_COLOR_PIXELS or np.percentile(samples.behind.max(-1), THICK_PERCENTILE) >= MIN_COLORED_VALUE:
+        return []
+    if np.percentile(shown.max(-1), THICK_PERCENTILE) < MIN_COLORED_VALUE:
+        return []
+    off = _degrees_off_one_color(shown)
+    if off < MIN_COLOR_DEGREES:
+        return []
+    ends = np.cumsum(samples.counts, dtype=np.intp)[:-1]
+    frames = [part[part.min(-1, initial=1.0) < CLIPPED_VALUE] for part in np.split(samples.colors, ends)]
+    apart = [_degrees_off_one_color(frame.astype(np.float64)) for frame in frames if len(frame) >= MIN_COLOR_PIXELS]
+    changes = apart and np.median(apart) < MIN_COLOR_DEGREES
+    kind = "smoke that changes its color" if changes else "smoke of several colors"
+    return [Finding(kind, {"degrees": off}, doubt=True)]
+
+
+def _degrees_off_one_color(colors: Doubles) -> float:
+    """Root mean square of the degrees by which light (n, 3) is off the one color that explains most of it."""
+    along = np.linalg.eigvalsh(colors.T @ colors)
+    return float(np.degrees(np.arcsin(np.sqrt(along[:-1].sum().clip(0) / along.sum()))))
+
+
+def _line_of_colors(colors: Doubles, behind: Doubles) -> Doubles:
+    """Unit vector (3,) that explains most of how smoke (n, 3) changes its background."""
+    change = colors - behind
+    axis = np.linalg.eigh(change.T @ change)[1][:, -1]
+    return np.asarray(axis if np.sum(change @ axis) >= 0 else -axis)
+
+
+def _thickest_smoke(samples: SmokeSamples) -> tuple[Doubles, Doubles] | None:
+    """Background (3,) and color (3,) of the thickest smoke that is not clipped; None if there is too little."""
+    clear = brightest_channel(samples.colors) < CLIPPED_VALUE
+    if clear.sum() < max(MIN_COLOR_PIXELS, 0.1 * len(clear)):
+        return None
+    colors, behind = (values[clear].astype(np.float64) for values in (samples.colors, samples.behind))
+    change, axis = colors - behind, _line_of_colors(colors, behind)
+    # a small error of the line is all of a dark color, so that comes from the thickest pixels themselves
+    amount = change @ axis if samples.brightens else np.linalg.norm(change, axis=-1)
+    thick = amount >= np.percentile(amount, THICK_PERCENTILE)
+    start = np.maximum(behind[thick].mean(0), 0)
+    seen = start + amount[thick].mean() * axis if samples.brightens else colors[thick].mean(0)
+    return (start, np.maximum(seen, 0)) if seen.max() >= MIN_COLORED_VALUE else None
+
+
+def _sources(behind: Doubles, seen: Doubles) -> Doubles:
+    """Source radiances (n, 3) on the line: from the smoke that is seen to where a channel gets negative."""
+    change = seen - behind
+    falling = change < 0
+    most = min((behind[falling] / -change[falling]).min(), 1e3) if falling.any() else 1e3
+    return np.asarray(np.maximum(behind + np.geomspace(1, max(most, 1), 256)[:, None] * change, 0))
+
+
+def _degrees(colors: Doubles, other: Doubles) -> Doubles:
+    """Degrees (n,) between colors (n, 3) and another (3,)."""
+    length = np.linalg.norm(colors, axis=-1) * np.linalg.norm(other)
+    return np.asarray(np.degrees(np.arccos(np.clip(colors @ other / np.maximum(length, 1e-12), -1, 1))))
 
 
 def first_light(

@@ -13,13 +13,11 @@ from smokelift.density import AxisEstimate, clip_axis
 from smokelift.footage.clip import Clip
 from smokelift.render import Image, scene_optics
 from smokelift.scene import SHADOWED, Background, CompleteScene, Domain, Scattering, Scene
-from smokelift.setup.background_findings import first_findings
 from smokelift.setup.coarse import coarse_frame, coarse_frames
-from smokelift.setup.first_estimate import FirstEstimate, first_estimate
+from smokelift.setup.first_estimate import FirstEstimate, first_estimate, first_findings
 from smokelift.setup.further_views import disagreement, open_views
 from smokelift.setup.geometry import find_geometry
-from smokelift.setup.illumination import find_scattering, first_light, light_doubts
-from smokelift.setup.medium import find_medium
+from smokelift.setup.illumination import find_medium, find_scattering, first_light, light_doubts
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot, ShotView
 from smokelift.velocity.pyramid import COARSEST_SIDE, default_coarsening
@@ -71,7 +69,7 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
         inlets=scene.inlets,
     )
     source = _source_in_light(estimate, complete) if scene.lights else estimate.source
-    first = replace(ShotView.facing(domain, estimate.clip, camera, estimate.plate), source=source)
+    first = ShotView.facing(domain, estimate.clip, camera, estimate.plate, source)
     complete, of_scattering = _with_scattering(complete, asked, first, estimate, bool(of_light), settings)
     if complete.scattering == "absorption":
         of_light = [found for found in of_light if found.about != "source radiance"]

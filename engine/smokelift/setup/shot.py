@@ -1,7 +1,6 @@
 """A shot: a clip with everything about it decided."""
 
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -12,9 +11,8 @@ from smokelift.extraction.plate import Plate, uncovered
 from smokelift.footage.clip import Clip
 from smokelift.render import Image, Optics
 from smokelift.scene import Camera, CompleteScene, Domain, Inlet
-from smokelift.setup.resolution import Grid
+from smokelift.setup.geometry import Grid, WorkingPicture, working_picture
 from smokelift.setup.settings import Quality, Settings
-from smokelift.setup.working_picture import CameraError, WorkingPicture, working_picture
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,12 +31,12 @@ class ShotView:
     source: Image | None = None
 
     @staticmethod
-    def facing(domain: Domain, clip: Clip, camera: Camera, plate: Plate) -> "ShotView":
-        """Return a camera's view of a domain; CameraError if no frame shows it."""
-        for frame in range(len(camera.matrices)):
-            with suppress(CameraError):
-                return ShotView(clip, camera, plate, working_picture(camera.at(frame), domain))
-        return ShotView(clip, camera, plate, working_picture(camera, domain))
+    def facing(domain: Domain, clip: Clip, camera: Camera, plate: Plate, source: Image | None) -> "ShotView":
+        """Return a camera's view of a domain; ValueError if no frame shows it."""
+        for frame in range(len(camera.matrices) or 1):
+            if (working := working_picture(camera.at(frame), domain)) is not None:
+                return ShotView(clip, camera, plate, working, source)
+        raise ValueError("The camera does not see the domain; move the domain into the picture or turn the camera.")
 
     def observe(self, frame: int, domain: Domain) -> Observation | None:
         """What the camera saw in a frame, from 0, as a small picture; None if that shows nothing of the domain."""
@@ -62,12 +60,7 @@ class ShotView:
 
     def working_at(self, frame: int, domain: Domain) -> WorkingPicture | None:
         """The small picture of a frame, from 0; None if the frame shows nothing of the domain."""
-        if not self.camera.moves:
-            return self.working
-        try:
-            return working_picture(self.camera.at(frame), domain)
-        except CameraError:
-            return None
+        return working_picture(self.camera.at(frame), domain) if self.camera.moves else self.working
 
     @cached_property
     def _still_plate(self) -> Plate:

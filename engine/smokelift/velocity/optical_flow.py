@@ -24,7 +24,7 @@ from scipy.sparse.linalg import cg
 
 from smokelift.checks import Array, Doubles
 from smokelift.scene import Camera, Domain
-from smokelift.scene.projection import project_points
+from smokelift.scene.camera import project_points
 from smokelift.transport import Velocity, on_faces, without_divergence
 
 CURVATURE, REST = 0.05, 0.14

@@ -21,9 +21,8 @@ from smokelift.checks import Source
 from smokelift.direct import new_sequence
 from smokelift.direct.retiming import playback
 from smokelift.extraction.find_background import MOVING_CAMERA
-from smokelift.footage.frame_source import ClipError
-from smokelift.footage.image_sequence import numbered_files
-from smokelift.footage.images import READABLE
+from smokelift.footage.frame_source import ClipError, numbered_files
+from smokelift.footage.image_files import READABLE
 from smokelift.output.export import ASSET, NOTE
 from smokelift.output.files import INDEX, frame_path, proxy_path
 from smokelift.output.vdb import MIN_PROXY_VOXELS

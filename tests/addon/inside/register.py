@@ -7,7 +7,7 @@ import pytest
 
 import addon
 from smokelift.direct.continuation import ROOM
-from smokelift.footage.images import Transfer
+from smokelift.footage.image_files import Transfer
 from smokelift.render.device import DeviceName
 from smokelift.scene import Medium
 from smokelift.setup.settings import QUALITIES, Settings

@@ -12,7 +12,7 @@ from command_line import command, refused
 from PIL import Image
 
 from smokelift import Background, Clip, Scene, extract, reconstruct
-from smokelift.footage.images import read_image
+from smokelift.footage.image_files import read_image
 from smokelift.output.images import write_image
 
 

@@ -8,7 +8,7 @@ import pytest
 from command_line import QUICK, command, events_of, refused
 
 from smokelift import Background, Scene, Sequence
-from smokelift.footage.images import read_image
+from smokelift.footage.image_files import read_image
 from smokelift.output.images import write_image
 from smokelift.setup.settings import QUALITIES
 

@@ -5,7 +5,7 @@ import pytest
 from command_line import command, refused
 
 from smokelift import Clip, Sequence, render
-from smokelift.footage.images import read_image
+from smokelift.footage.image_files import read_image
 from smokelift.output.images import eight_bit
 from smokelift.scene import Camera, Scene, orbit
 

@@ -6,7 +6,7 @@ from scipy import ndimage
 
 from smokelift.density.hull import project_voxels
 from smokelift.scene import Camera, Domain
-from smokelift.scene.projection import project_points
+from smokelift.scene.camera import project_points
 
 DOMAIN = Domain((-1.0, -1.0, 0.0), (1.0, 1.0, 3.0), (10, 10, 15))
 CENTERS = np.stack(np.broadcast_arrays(*DOMAIN.offsets((0, 0, 0))), -1)

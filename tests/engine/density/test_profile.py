@@ -9,7 +9,7 @@ from smokelift.density.hull import project_voxels
 from smokelift.density.profile import DepthProfile, inflated
 from smokelift.density.upright_plane import SmokeAxis
 from smokelift.scene import Camera, Domain
-from smokelift.scene.projection import project_points
+from smokelift.scene.camera import project_points
 
 DOMAIN = Domain((-1, -1, 0), (1, 1, 3), (32, 32, 48))
 BOX = Domain((-1.5, -1.5, 0), (1.5, 1.5, 3), (48, 48, 48))

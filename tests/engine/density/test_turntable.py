@@ -5,7 +5,7 @@ import pytest
 
 from smokelift.density.turntable import Turntable, UprightSmoke
 from smokelift.scene import Camera, Domain, orbit
-from smokelift.scene.projection import project_points
+from smokelift.scene.camera import project_points
 
 DOMAIN = Domain((-0.6, -0.4, 0.0), (0.6, 0.4, 1.6), (24, 16, 32))
 CAMERA = Camera.look_at((3, -4, 1.1), (0, 0, 0.8), fov_y_degrees=27, size=(40, 56))

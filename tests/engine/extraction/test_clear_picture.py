@@ -1,15 +1,20 @@
-"""The clean plate that is found from the clip alone."""
+"""The clean plate that is found from the clip alone, also that of large pictures, found on small ones."""
+
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from smokelift.extraction.clear_picture import _correction, clear_picture
+from smokelift.extraction.find_background import find_background
 from smokelift.extraction.matte import matte
+from smokelift.extraction.plate import Plate
 from smokelift.extraction.proxy import Proxy
+from smokelift.footage.clip import Clip
 from smokelift.footage.images import linear_to_srgb, srgb_to_linear
 from smokelift.footage.noise import lasting_noise
 from smokelift.setup.first_estimate import first_estimate
-from tests.engine.films import HEIGHT, WIDTH, codes_apart, film, plate_of, puff, wall
+from tests.engine.films import HEIGHT, WIDTH, Filmed, codes_apart, film, plate_of, puff, wall
 
 
 @pytest.mark.parametrize(
@@ -161,3 +166,70 @@ def test_a_clear_moment_is_corrected_by_what_goes_on_beside_it_but_an_object_is_
     change = _correction(image, np.ones_like(steady), steady, weights, smoke)
     assert np.abs((image + change - truth)[22:30, 24:40]).mean() < 0.4 * np.abs((image - truth)[22:30, 24:40]).mean()
     assert max(np.abs(change[34:44, 24:40]).max(), np.abs(change[steady]).max()) < 1e-6
+
+
+FRAMES = 16
+LARGE = (80, 1280)
+
+
+def whole_film(behind: np.ndarray, gains: np.ndarray | None = None, column: bool = False, noise: float = 1.0) -> Clip:
+    """A bright puff that goes by before a background, perhaps beside a column of smoke that stays; noise in codes."""
+    random = np.random.default_rng(1)
+    rows, columns = np.mgrid[: LARGE[0], : LARGE[1]].astype(np.float32)
+    codes = np.empty((FRAMES, *LARGE, 3), np.uint8)
+    for n in range(FRAMES):
+        away = np.hypot(rows - LARGE[0] / 2, columns - 75 * n)
+        alpha = 0.7 * np.clip(1.5 - away / 45, 0, 1) * (1 + 0.2 * np.sin(0.9 * n + rows / 12))
+        if column:
+            alpha = np.maximum(alpha, np.where(np.abs(columns - 640) < 40, random.uniform(0.3, 0.9), 0))
+        light = behind * (1 - alpha[..., None]) + 0.6 * alpha[..., None]
+        light = light * (1 if gains is None else gains[n])
+        encoded = linear_to_srgb(light) * 255 + np.float32(noise) * random.standard_normal(light.shape, np.float32)
+        codes[n] = np.clip(encoded + 0.5, 0, 255)
+    return Clip(Path("film"), Filmed(codes))
+
+
+def large_wall() -> np.ndarray:
+    """Tiles with joints and a grain of single pixels, linear."""
+    random = np.random.default_rng(0)
+    rows, columns = np.mgrid[: LARGE[0], : LARGE[1]]
+    tiles = np.kron(random.uniform(0.3, 0.5, (LARGE[0] // 20, -(-LARGE[1] // 20), 3)), np.ones((20, 20, 1)))
+    encoded = tiles[:, : LARGE[1]] + random.normal(0, 0.02, (*LARGE, 1))
+    encoded[(rows % 20 < 2) | (columns % 20 < 2)] += 0.1
+    return srgb_to_linear(np.clip(encoded, 0, 1))
+
+
+def found_on(clip: Clip) -> Plate:
+    background = find_background(clip, None, None)
+    assert background.source == "picture"
+    return background.plate
+
+
+@pytest.mark.parametrize(
+    ("steps", "noise"), [(False, 1.0), (True, 1.0), (False, 6.0)], ids=["steady", "steps", "noisy"]
+)
+def test_a_wall_is_found_to_the_last_pixel(steps, noise) -> None:
+    truth = large_wall()
+    gains = np.repeat([1.0, 1.25, 0.8, 1.0], FRAMES // 4) if steps else None
+    plate = found_on(whole_film(truth, gains, noise=noise))
+    known = plate.confidence > 0.5
+    np.testing.assert_allclose(255 * plate.noise.white, noise, rtol=0.15)
+    assert plate.image.shape == truth.shape
+    assert known.mean() > 0.9
+    apart = codes_apart(plate.image, truth)[known]
+    assert np.median(apart) < 0.8 * noise
+    assert np.percentile(apart, 95) < 3 * noise
+
+
+def test_what_smoke_never_leaves_keeps_the_detail_that_shows_through() -> None:
+    truth = large_wall()
+    plate = found_on(whole_film(truth, column=True))
+    inside = np.s_[:, 615:665]
+    assert (plate.confidence[inside] < 0.5).mean() > 0.9
+    assert 0.03 < np.sqrt(np.trace(plate.errors)) < 0.2
+    apart = codes_apart(plate.image, truth)[inside]
+    assert np.mean(apart) < 22
+    fine, wanted = (linear_to_srgb(image)[inside].mean(-1) for image in (plate.image, truth))
+    grain, true_grain = (each[1:, 1:] - each[:-1, :-1] for each in (fine, wanted))
+    assert np.corrcoef(grain.ravel(), true_grain.ravel())[0, 1] > 0.8
+    assert 0.6 < grain.std() / true_grain.std() < 1.2

@@ -8,8 +8,7 @@ import pytest
 from scipy import ndimage
 
 from smokelift import Camera, Clip
-from smokelift.extraction.background_kind import color_around
-from smokelift.extraction.find_background import FoundBackground, find_background
+from smokelift.extraction.find_background import FoundBackground, color_around, find_background
 from smokelift.extraction.matte import matte
 from smokelift.footage.images import srgb_to_linear
 from smokelift.output.images import write_image

@@ -7,7 +7,8 @@ from PIL import Image
 from smokelift import Background, Clip
 from smokelift.extraction.find_background import find_background
 from smokelift.footage.frame_source import FrameSource, Layer, StoredPicture, alpha_background_of
-from smokelift.footage.images import area_average, code_values, linear_to_srgb, srgb_to_linear
+from smokelift.footage.image_files import code_values
+from smokelift.footage.images import area_average, linear_to_srgb, srgb_to_linear
 from tests.engine.films import encode
 
 QUICKTIME = "com.apple.quicktime.camera.focal_length.35mm_equivalent"

@@ -10,7 +10,7 @@ from smokelift import Background, Clip
 from smokelift.extraction.find_background import find_background
 from smokelift.extraction.plate import Plate, cleared, known_plate, uncovered
 from smokelift.footage.frame_source import ClipError
-from smokelift.footage.images import ImageError
+from smokelift.footage.image_files import ImageError
 from smokelift.footage.mask import Mask
 from smokelift.output.images import write_image, write_video
 from tests.engine.films import COUNT, HEIGHT, WIDTH, codes_apart, film, plate_of, puff, wall

@@ -14,7 +14,7 @@ import pytest
 
 from smokelift.footage.clip import Clip
 from smokelift.footage.frame_source import ClipError
-from smokelift.footage.images import ImageError, read_image
+from smokelift.footage.image_files import ImageError, read_image
 from smokelift.footage.video import median_quantizer
 from tests.engine.films import coded, encode, film, puff, wall
 

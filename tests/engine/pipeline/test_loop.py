@@ -15,7 +15,7 @@ from smokelift.baselines.paper_method import FixedRateDescent
 from smokelift.density import GradientFit, Start, ViewSet
 from smokelift.density.hull import project_voxels
 from smokelift.evaluation.metrics import psnr
-from smokelift.footage.images import read_image
+from smokelift.footage.image_files import read_image
 from smokelift.output.images import write_image
 from smokelift.output.index import SequenceError
 from smokelift.pipeline import Frame, Method, Reconstruction, compose, reconstruct

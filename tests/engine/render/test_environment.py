@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from smokelift.footage.images import ImageError
+from smokelift.footage.image_files import ImageError
 from smokelift.output.images import write_image
 from smokelift.render import Optics
 from smokelift.render.environment import EnvironmentCells, environment_count, sampled_lights

@@ -1,10 +1,19 @@
-"""What several tests of scenes need: a file that uses every table, and a camera that moves."""
+"""What several tests of scenes need: a file that uses every table, and cameras that stand and move."""
 
 from pathlib import Path
 
-from smokelift.scene import Camera, Scene, look_at_matrix
+import numpy as np
+
+from smokelift.scene import Camera, Domain, Scene, look_at_matrix
 
 FRONT = ((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, -1.0, -7.0), (0.0, 1.0, 0.0, 1.5), (0.0, 0.0, 0.0, 1.0))
+
+DOMAIN = Domain((-0.6, -0.6, 0), (0.6, 0.6, 1.6), (24, 24, 32))
+CENTER = np.array([0, 0, 0.8])
+PERSPECTIVE = Camera.look_at((0, -4, 0.8), (0, 0, 0.8), fov_y_degrees=30, size=(160, 224))
+ORTHOGRAPHIC = Camera("orthographic", PERSPECTIVE.matrix, (160, 224), 103.0, 103.0, 80.0, 112.0)
+TILTED = Camera.look_at((1, -4, 2.0), (0, 0, 0.8), fov_y_degrees=30, size=(160, 224))
+"""Cameras that face the middle of a domain, and see all of it."""
 
 GOOD = """\
 # a shot

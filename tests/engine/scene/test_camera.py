@@ -5,16 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scene_examples import FRONT, moving_camera
+from scene_examples import CENTER, DOMAIN, FRONT, ORTHOGRAPHIC, PERSPECTIVE, TILTED, moving_camera
 
-from smokelift.scene import Camera, Domain, SceneError, orbit
-from smokelift.scene.projection import project_points
+from smokelift.scene import Camera, SceneError, orbit
+from smokelift.scene.camera import project_points
 
-DOMAIN = Domain((-0.6, -0.6, 0), (0.6, 0.6, 1.6), (24, 24, 32))
-CENTER = np.array([0, 0, 0.8])
-PERSPECTIVE = Camera.look_at((0, -4, 0.8), (0, 0, 0.8), fov_y_degrees=30, size=(160, 224))
-ORTHOGRAPHIC = Camera("orthographic", PERSPECTIVE.matrix, (160, 224), 103.0, 103.0, 80.0, 112.0)
-TILTED = Camera.look_at((1, -4, 2.0), (0, 0, 0.8), fov_y_degrees=30, size=(160, 224))
 both = pytest.mark.parametrize("camera", [PERSPECTIVE, ORTHOGRAPHIC], ids=["perspective", "orthographic"])
 all_three = pytest.mark.parametrize(
     "camera", [PERSPECTIVE, ORTHOGRAPHIC, TILTED], ids=["perspective", "orthographic", "tilted"]

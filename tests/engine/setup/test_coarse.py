@@ -15,8 +15,8 @@ from smokelift.footage.noise import EIGHT_BIT_NOISE
 from smokelift.output.images import write_image
 from smokelift.scene import Domain, completed
 from smokelift.setup.coarse import COARSE_SIDE, CoarseFrame, chequered, coarse_domain, coarse_frame, held_out
+from smokelift.setup.geometry import working_picture
 from smokelift.setup.shot import ShotView
-from smokelift.setup.working_picture import working_picture
 
 
 @given(st.tuples(*[st.integers(8, 160)] * 3), st.floats(0.3, 20))

@@ -9,10 +9,10 @@ from scipy.spatial.transform import Rotation
 from smokelift import Clip, Shot
 from smokelift.checks import UNDETERMINED, Finding
 from smokelift.density.upright_plane import AxisEstimate, SmokeAxis, view_frame
-from smokelift.footage.images import read_image
+from smokelift.footage.image_files import read_image
 from smokelift.output.images import write_image
 from smokelift.scene import Background, Camera, ClipSource, Domain, Inlet, Scene, as_matrix, completed, look_at_matrix
-from smokelift.scene.projection import project_points
+from smokelift.scene.camera import project_points
 from smokelift.setup.first_estimate import first_estimate
 from smokelift.setup.geometry import MIN_SIDE_VOXELS, Geometry, find_geometry
 from smokelift.setup.prepare import found_place, velocity_coarsening

@@ -8,7 +8,7 @@ from scipy import ndimage
 
 from smokelift.pipeline import compose
 from smokelift.scene import Camera, Domain, look_at_matrix
-from smokelift.scene.projection import project_points
+from smokelift.scene.camera import project_points
 from smokelift.setup.settings import Settings
 from smokelift.transport import Velocity, face_shapes, on_faces, project
 from smokelift.velocity.optical_flow import PicturePair, averaged_along, correct_by_optical_flow

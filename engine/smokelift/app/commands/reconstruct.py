@@ -30,7 +30,7 @@ from smokelift.report.facts import facts, forecast_of
 from smokelift.report.result import count_empty, expected_shortcomings, made_up, shortcomings
 from smokelift.report.views import sentence
 from smokelift.scene import Domain
-from smokelift.setup.background_findings import what_helps
+from smokelift.setup.first_estimate import what_helps
 from smokelift.setup.shot import Shot
 
 

@@ -20,7 +20,8 @@ from addon.scene.smoke import activate
 from conftest import rendered, save_image
 from smokelift.evaluation.metrics import psnr
 from smokelift.footage.clip import Clip
-from smokelift.footage.images import area_average, linear_to_srgb, read_image
+from smokelift.footage.image_files import read_image
+from smokelift.footage.images import area_average, linear_to_srgb
 from smokelift.output.images import write_image
 from smokelift.output.sequence import Sequence
 from smokelift.scene import Scene, scene_from_dict

@@ -16,7 +16,7 @@ from addon.scene.box import box_corners, engine_to_world
 from addon.scene.scene_file import options, shot_tables
 from conftest import save_image
 from smokelift.scene import Scene
-from smokelift.scene.projection import project_points
+from smokelift.scene.camera import project_points
 from tests.example_shot import EXAMPLE, add, smoke
 
 

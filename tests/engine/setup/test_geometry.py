@@ -1,4 +1,4 @@
-"""Resolution by measurement: detail asks for voxels; blur and noise do not."""
+"""Voxels by measurement, as detail asks for them and blur and noise do not; and the picture that they are fitted to."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -10,10 +10,12 @@ from scipy import ndimage
 from smokelift.checks import Finding
 from smokelift.footage.images import linear_to_srgb, srgb_to_linear
 from smokelift.scene import Box, Camera, ClipSource, Domain, Scene
-from smokelift.scene.projection import voxel_width
-from smokelift.setup.resolution import RINGS, DetailSpectrum, smoke_detail
+from smokelift.scene.camera import project_points, voxel_width
+from smokelift.setup.geometry import RINGS, DetailSpectrum, smoke_detail, working_picture
 from smokelift.setup.settings import LIMITS, Settings
+from smokelift.setup.shot import ShotView
 from tests.engine.films import clear_plate, clip_of
+from tests.engine.scene.scene_examples import CENTER, DOMAIN, ORTHOGRAPHIC, PERSPECTIVE, TILTED
 from tests.engine.setup.shots import geometry_of
 
 SIZE = (192, 256)
@@ -131,3 +133,59 @@ def test_a_grid_loses_what_is_finer_than_two_of_its_voxels() -> None:
     assert detail.lost(100, 192) < 0.01
     assert detail.lost(192 // 4, 192) == detail.lost(192 // 4)
     assert DetailSpectrum(np.zeros(RINGS), 64).lost(32) == 0
+
+
+both = pytest.mark.parametrize("camera", [PERSPECTIVE, ORTHOGRAPHIC])
+
+
+@both
+def test_a_working_pixel_is_a_voxel_wide_at_the_center(camera) -> None:
+    small = working_picture(camera, DOMAIN).camera
+    h = DOMAIN.voxel_size
+    origin, _ = project_points(small, CENTER)
+    for step in ((h, 0, 0), (0, 0, h)):
+        moved, _ = project_points(small, CENTER + np.array(step))
+        assert np.linalg.norm(moved - origin) == pytest.approx(1.0, rel=0.05)
+
+
+@pytest.mark.parametrize("camera", [PERSPECTIVE, ORTHOGRAPHIC, TILTED])
+def test_points_fall_to_the_same_place_of_both_pictures(camera) -> None:
+    work = working_picture(camera, DOMAIN)
+    points = np.random.default_rng(1).uniform(DOMAIN.min, DOMAIN.max, (50, 3))
+    full, depth = project_points(camera, points)
+    small, small_depth = project_points(work.camera, points)
+    shrink = np.array(work.camera.size) / (work.width, work.height)
+    np.testing.assert_allclose(small, (full - (work.left, work.top)) * shrink, atol=1e-9)
+    np.testing.assert_allclose(small_depth, depth)
+    assert (small >= 0).all()
+    assert (small <= work.camera.size).all()
+
+
+@both
+def test_the_cut_shows_what_the_small_camera_sees(camera) -> None:
+    """A picture whose values are its own coordinates, cut, reads right at the projections of world points."""
+    work = working_picture(camera, DOMAIN)
+    width, height = camera.size
+    y, x = np.mgrid[:height, :width] + 0.5
+    cut = work.cut(np.stack([x, y], -1).astype(np.float32))
+    columns, rows = work.camera.size
+    assert cut.shape == (rows, columns, 2)
+    small_y, small_x = np.mgrid[:rows, :columns] + 0.5
+    across, down = work.width / columns, work.height / rows
+    np.testing.assert_allclose(cut[..., 0], work.left + small_x * across, atol=0.05)
+    np.testing.assert_allclose(cut[..., 1], work.top + small_y * down, atol=0.05)
+
+
+@both
+def test_coarse_footage_is_not_enlarged(camera) -> None:
+    work = working_picture(camera.resized(20, 28), DOMAIN)
+    assert work.camera.size == (work.width, work.height)
+    assert work.width <= 20
+
+
+@both
+def test_a_domain_outside_the_view_is_refused(camera) -> None:
+    beside = Domain((9.4, -0.6, 0), (10.6, 0.6, 1.6), (24, 24, 32))
+    assert working_picture(camera, beside) is None
+    with pytest.raises(ValueError, match="does not see the domain"):
+        ShotView.facing(beside, None, camera, None, None)

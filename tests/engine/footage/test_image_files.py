@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from smokelift.footage.clip import Clip
-from smokelift.footage.color import PRIMARIES, association, hlg_to_linear, pq_to_linear, to_bt709
+from smokelift.footage.image_files import PRIMARIES, association, hlg_to_linear, pq_to_linear, to_bt709
 from smokelift.footage.images import linear_to_srgb, srgb_to_linear
 from tests.engine.films import encode, write_exr
 
