@@ -8,7 +8,7 @@ What is left out or rounded does not show in a picture of 8 bits:
   `HALF_CODE`. Powers of two leave the last bits of a 16 bit float zero, which compresses well.
 - Quantized velocities move smoke by at most half of `VELOCITY_STEP` voxels per frame.
 
-Names, axes and the range of values are those of the program that reads the files (`smokelift.output.host`).
+Names, axes and the range of values are those of the program that reads the files (`smokelift.output.vdb`).
 """
 
 import json
@@ -26,11 +26,10 @@ import numpy as np
 from smokelift.checks.whole_files import write_text
 from smokelift.output.archive import FLAME
 from smokelift.output.files import INDEX, frame_path, proxy_path
-from smokelift.output.host import HOSTS, Host, HostName
 from smokelift.output.index import SequenceError
 from smokelift.output.sequence import Sequence
 from smokelift.output.usd import light_properties, usd_text
-from smokelift.output.vdb import vdb_module, write_proxy, write_vdb
+from smokelift.output.vdb import HOSTS, Host, HostName, vdb_module, write_proxy, write_vdb
 from smokelift.scene import Domain, Medium
 from smokelift.transport import Array
 

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from smokelift.output.files import frame_path, proxy_path
-from smokelift.output.host import Host
+from smokelift.output.vdb import Host
 from smokelift.scene import Domain, Medium
 
 MATERIAL = "/Smoke/Material"

@@ -11,9 +11,9 @@ from small_sequence import BURNING, SCENE, SETTINGS, frame, names, needs_vdb, wr
 from smokelift import Medium, Sequence
 from smokelift.output import export, vdb
 from smokelift.output.export import ExportSettings, export_sequence
-from smokelift.output.host import HOSTS
 from smokelift.output.index import SequenceError
 from smokelift.output.usd import usd_text
+from smokelift.output.vdb import HOSTS
 from smokelift.output.writer import SequenceWriter
 
 DOMAIN, EXTINCTION = SCENE.domain, SCENE.medium.extinction

@@ -15,8 +15,8 @@ from smokelift.output.export import (
     require_export,
     require_space,
 )
-from smokelift.output.host import HostName
 from smokelift.output.sequence import Sequence
+from smokelift.output.vdb import HostName
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
