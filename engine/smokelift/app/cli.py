@@ -19,8 +19,7 @@ from smokelift.app.options import add_device, whole_number
 from smokelift.app.progress import OutputError, reporter
 from smokelift.checks import printable
 from smokelift.footage.image_files import READABLE
-from smokelift.output.files import DISK_FULL
-from smokelift.output.index import DirectoryBusyError
+from smokelift.output.index import DISK_FULL, DirectoryBusyError
 from smokelift.output.vdb import VdbUnavailable
 from smokelift.render import DeviceError
 from smokelift_command.exits import BAD_INPUT, CANCELLED, DONE, NO_DEVICE, Termination

@@ -21,8 +21,7 @@ import psutil
 
 from smokelift.batch.shots import BatchShot
 from smokelift.checks.whole_files import write_text
-from smokelift.output.files import Lock
-from smokelift.output.index import Index, SequenceError
+from smokelift.output.index import Index, Lock, SequenceError
 from smokelift_command.exits import BAD_INPUT, CANCELLED, DONE, NO_DEVICE
 
 ENGINE = (sys.executable, "-m", "smokelift_command.tethered")

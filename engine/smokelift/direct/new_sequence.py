@@ -10,7 +10,7 @@ import numpy as np
 
 from smokelift.checks import Mask, counted
 from smokelift.direct.state import SmokeState, largest_divergence
-from smokelift.output.files import INDEX, checksum
+from smokelift.output.index import INDEX, checksum
 from smokelift.output.sequence import Sequence
 from smokelift.output.writer import SequenceWriter
 from smokelift.transport import faces_in

@@ -28,8 +28,7 @@ import numpy as np
 
 from smokelift.checks.whole_files import write_text
 from smokelift.output.archive import FLAME
-from smokelift.output.files import INDEX, frame_path, proxy_path
-from smokelift.output.index import SequenceError
+from smokelift.output.index import INDEX, SequenceError, frame_path, proxy_path
 from smokelift.output.sequence import Sequence
 from smokelift.output.vdb import HOSTS, Host, HostName, vdb_module, write_proxy, write_vdb
 from smokelift.scene import Domain, Medium

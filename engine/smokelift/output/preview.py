@@ -16,9 +16,9 @@ import numpy as np
 from smokelift.extraction.given_background import background_picture, single_color
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import area_average
-from smokelift.output.files import CONTACT_SHEET, ORBIT, PREVIEW, STRIP
 from smokelift.output.framing import Framing, frame_smoke
 from smokelift.output.images import eight_bit, write_sheet, write_video
+from smokelift.output.index import CONTACT_SHEET, ORBIT, PREVIEW, STRIP
 from smokelift.output.sequence import Sequence
 from smokelift.output.viewer import Viewer
 from smokelift.render import Image

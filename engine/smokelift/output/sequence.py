@@ -10,8 +10,7 @@ import numpy as np
 from smokelift.checks import shown
 from smokelift.footage.frame_source import DEFAULT_FPS
 from smokelift.output.archive import FLAME, VELOCITY, read_arrays
-from smokelift.output.files import INDEX, checksum, frame_path
-from smokelift.output.index import Index, SequenceError, directory_path
+from smokelift.output.index import INDEX, Index, SequenceError, checksum, directory_path, frame_path
 from smokelift.output.vdb import read_grid
 from smokelift.output.viewer import Viewer
 from smokelift.render import Image

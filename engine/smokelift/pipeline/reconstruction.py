@@ -7,8 +7,7 @@ from typing import Any
 
 from smokelift.checks import require_kind
 from smokelift.footage.clip import Clip
-from smokelift.output.files import checksum
-from smokelift.output.index import directory_path
+from smokelift.output.index import checksum, directory_path
 from smokelift.output.sequence import Sequence
 from smokelift.output.writer import SequenceWriter
 from smokelift.pipeline.carried_state import CarriedState

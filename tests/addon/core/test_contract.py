@@ -24,7 +24,7 @@ from smokelift.extraction.find_background import MOVING_CAMERA
 from smokelift.footage.frame_source import ClipError, numbered_files
 from smokelift.footage.image_files import READABLE
 from smokelift.output.export import ASSET, NOTE
-from smokelift.output.files import INDEX, frame_path, proxy_path
+from smokelift.output.index import INDEX, frame_path, proxy_path
 from smokelift.output.vdb import MIN_PROXY_VOXELS
 from smokelift.scene import SIDES, EnvironmentLight, SceneError
 from smokelift.setup.settings import LIMITS, QUALITIES, Settings

@@ -14,8 +14,7 @@ import pytest
 from small_sequence import BURNING, SCENE, SETTINGS, frame, names, write
 
 from smokelift.output.archive import VELOCITY
-from smokelift.output.files import LOCK, PICTURES
-from smokelift.output.index import SequenceError
+from smokelift.output.index import LOCK, PICTURES, SequenceError
 from smokelift.output.resume import ResumeState
 from smokelift.output.sequence import Sequence
 from smokelift.output.writer import SequenceWriter, count_finished

@@ -15,8 +15,7 @@ from smokelift.direct.new_sequence import Written, open_source
 from smokelift.direct.retiming import playback, retime_sequence
 from smokelift.direct.surroundings import Ball, BoxObstacle, Fan
 from smokelift.direct.turbulence import Turbulence
-from smokelift.output.files import INDEX
-from smokelift.output.index import Index
+from smokelift.output.index import INDEX, Index
 from smokelift.output.sequence import Sequence
 from smokelift.report.cost import affordable_room
 from smokelift.scene import SIDES

@@ -19,9 +19,8 @@ from smokelift.app.progress import Reporter, seconds_before
 from smokelift.checks import Figures, Finding
 from smokelift.checks.whole_files import atomic_path
 from smokelift.footage.clip import Clip
-from smokelift.output.files import MAX_START_NUMBER
 from smokelift.output.images import eight_bit
-from smokelift.output.index import median_psnr
+from smokelift.output.index import MAX_START_NUMBER, median_psnr
 from smokelift.output.writer import check_directory, count_finished, written_kinds
 from smokelift.pipeline import Frame, reconstruct
 from smokelift.render import device

@@ -13,7 +13,7 @@ from smokelift.checks.whole_files import write_text
 from smokelift.evaluation.evaluate import evaluate
 from smokelift.footage.clip import Clip
 from smokelift.output.export import write_proxies
-from smokelift.output.files import PICTURES
+from smokelift.output.index import PICTURES
 from smokelift.output.preview import write_previews
 from smokelift.output.sequence import Sequence
 from smokelift.render import device
