@@ -15,7 +15,7 @@ from smokelift.direct.new_sequence import MIN_FRAMES, Written, directed_writer, 
 from smokelift.direct.state import SmokeState, read_state
 from smokelift.direct.surroundings import Fan, Obstacle, Surroundings, require_place
 from smokelift.direct.turbulence import Turbulence
-from smokelift.output.resume import ResumeState
+from smokelift.output.archive import ResumeState
 from smokelift.output.sequence import Sequence
 from smokelift.output.writer import SequenceWriter
 from smokelift.scene import SIDES, Box, Domain, Side

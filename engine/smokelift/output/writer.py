@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from smokelift.checks import counted
 from smokelift.checks.whole_files import atomic_path
-from smokelift.output.archive import FLAME, VELOCITY, write_arrays
+from smokelift.output.archive import FLAME, VELOCITY, ResumeState, write_arrays
 from smokelift.output.images import write_image
 from smokelift.output.index import (
     BACKGROUND,
@@ -39,7 +39,6 @@ from smokelift.output.index import (
     json_value,
     proxy_path,
 )
-from smokelift.output.resume import ResumeState
 from smokelift.output.vdb import MIN_PROXY_VOXELS, VdbUnavailable, checked_volume, vdb_module, write_proxy, write_vdb
 from smokelift.scene import Background, CompleteScene, Domain, scene_to_dict
 from smokelift.transport import Array, Faces, Velocity, require_same_shape

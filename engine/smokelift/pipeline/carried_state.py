@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 
 from smokelift.footage.images import Picture
-from smokelift.output.resume import ResumeState
+from smokelift.output.archive import ResumeState
 from smokelift.render import Volume
 from smokelift.setup.shot import Shot
 from smokelift.transport import Velocity, halved

@@ -6,8 +6,8 @@ from small_sequence import SCENE, needs_vdb
 
 from smokelift import Domain, Sequence
 from smokelift.output import vdb
+from smokelift.output.archive import ResumeState
 from smokelift.output.export import ExportSettings, export_sequence, write_proxies
-from smokelift.output.resume import ResumeState
 from smokelift.output.writer import SequenceWriter
 from smokelift.transport import face_shapes
 

@@ -13,9 +13,8 @@ import numpy as np
 import pytest
 from small_sequence import BURNING, SCENE, SETTINGS, frame, names, write
 
-from smokelift.output.archive import VELOCITY
+from smokelift.output.archive import VELOCITY, ResumeState
 from smokelift.output.index import LOCK, PICTURES, SequenceError
-from smokelift.output.resume import ResumeState
 from smokelift.output.sequence import Sequence
 from smokelift.output.writer import SequenceWriter, count_finished
 from smokelift.transport import face_shapes
