@@ -14,8 +14,7 @@ from smokelift.evaluation.orbit_scores import orbit_scores
 from smokelift.evaluation.reference_view import ReferenceView, first_frame, open_views
 from smokelift.evaluation.truth import Truth, on_grid, resampled
 from smokelift.output.images import eight_bit, write_sheet
-from smokelift.output.sequence import Sequence
-from smokelift.output.viewer import Viewer
+from smokelift.output.sequence import Sequence, Viewer
 from smokelift.render import Volume
 
 TILE_AZIMUTHS, TILE_ROWS = tuple(range(0, 180, 18)), 240

@@ -10,8 +10,7 @@ from smokelift.checks import counted
 from smokelift.extraction.given_background import background_picture, open_plates
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import area_average, reduced_size
-from smokelift.output.sequence import Sequence
-from smokelift.output.viewer import Viewer
+from smokelift.output.sequence import Sequence, Viewer
 from smokelift.render import Image
 from smokelift.scene import Camera, Scene
 

@@ -19,8 +19,7 @@ from smokelift.footage.images import area_average
 from smokelift.output.framing import Framing, frame_smoke
 from smokelift.output.images import eight_bit, write_sheet, write_video
 from smokelift.output.index import CONTACT_SHEET, ORBIT, PREVIEW, STRIP
-from smokelift.output.sequence import Sequence
-from smokelift.output.viewer import Viewer
+from smokelift.output.sequence import Sequence, Viewer
 from smokelift.render import Image
 from smokelift.scene import Camera, orbit
 

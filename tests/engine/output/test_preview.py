@@ -11,7 +11,7 @@ from smokelift.output.framing import MIN_ASPECT, frame_smoke
 from smokelift.output.images import write_image
 from smokelift.output.index import PICTURES
 from smokelift.output.preview import ORBIT_COLUMNS, SHEET_ANGLES, SHEET_HEIGHT, STRIP_FRAMES, Preview, write_previews
-from smokelift.output.viewer import Viewer
+from smokelift.output.sequence import Viewer
 from smokelift.scene import Background, Scene, orbit
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from smokelift.footage.images import area_average
 from smokelift.output.images import write_image
-from smokelift.output.viewer import Viewer
+from smokelift.output.sequence import Viewer
 from smokelift.render import render
 from smokelift.scene import Background, completed, orbit
 

@@ -6,8 +6,7 @@ import math
 from smokelift.app.options import add_sequence, named_path, require_file
 from smokelift.app.progress import Reporter
 from smokelift.output.images import VIDEO_KINDS, write_image, write_video
-from smokelift.output.sequence import Sequence
-from smokelift.output.viewer import Viewer
+from smokelift.output.sequence import Sequence, Viewer
 from smokelift.render import device
 from smokelift.scene import Camera, CompleteScene, Scene, orbit
 
