@@ -1,4 +1,4 @@
-"""Reads a sequence: the scene, the settings and the frames that a reconstruction wrote, and what cameras see of them."""
+"""Reads a sequence: the scene, settings and frames that a reconstruction wrote, and what cameras see of them."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace

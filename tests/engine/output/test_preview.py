@@ -7,10 +7,18 @@ import pytest
 from small_sequence import at_rest, names
 
 from smokelift import Clip, Sequence
-from smokelift.output.framing import MIN_ASPECT, frame_smoke
 from smokelift.output.images import write_image
 from smokelift.output.index import PICTURES
-from smokelift.output.preview import ORBIT_COLUMNS, SHEET_ANGLES, SHEET_HEIGHT, STRIP_FRAMES, Preview, write_previews
+from smokelift.output.preview import (
+    MIN_ASPECT,
+    ORBIT_COLUMNS,
+    SHEET_ANGLES,
+    SHEET_HEIGHT,
+    STRIP_FRAMES,
+    Preview,
+    frame_smoke,
+    write_previews,
+)
 from smokelift.output.sequence import Viewer
 from smokelift.scene import Background, Scene, orbit
 
