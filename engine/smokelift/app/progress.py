@@ -17,7 +17,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from smokelift.checks import Figures, Finding, printable
 from smokelift.output.index import median_psnr, work_seconds
 from smokelift.output.sequence import Sequence
-from smokelift.report.views import message
+from smokelift.report.sentences import message
 
 Style = Literal["text", "json"]
 Made = TypeVar("Made")

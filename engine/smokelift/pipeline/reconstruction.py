@@ -14,7 +14,7 @@ from smokelift.pipeline.carried_state import CarriedState
 from smokelift.pipeline.loop import Frame, frames_after
 from smokelift.pipeline.method import Method, compose, other_parts
 from smokelift.report.result import provenance
-from smokelift.report.views import choices, part
+from smokelift.report.sentences import choices, part
 from smokelift.scene import EnvironmentLight, Scene
 from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.settings import Settings

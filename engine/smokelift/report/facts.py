@@ -9,7 +9,7 @@ import numpy as np
 from smokelift.checks import Figure, Figures, Finding, Source
 from smokelift.footage.noise import shows_exposure, small
 from smokelift.report.cost import Cost, Workload, estimate_cost
-from smokelift.report.views import fact
+from smokelift.report.sentences import fact
 from smokelift.scene import CompleteScene, Scene
 from smokelift.setup.geometry import PICTURE_HEIGHT
 from smokelift.setup.shot import Shot

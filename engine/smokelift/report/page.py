@@ -15,7 +15,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from smokelift.checks import UNDETERMINED, Finding
 from smokelift.checks.whole_files import atomic_path, write_text
-from smokelift.report.views import fact, sentence
+from smokelift.report.sentences import fact, sentence
 
 Color = tuple[int, int, int]
 """Codes (sRGB) of red, green and blue."""

@@ -5,7 +5,7 @@ from dataclasses import replace
 from smokelift.checks import Finding
 from smokelift.report.cost import Cost
 from smokelift.report.facts import boundaries, facts
-from smokelift.report.views import fact
+from smokelift.report.sentences import fact
 from smokelift.scene import Inlet, Scene, completed
 from smokelift.setup.settings import Settings
 from tests.engine.setup.shots import shot_of

@@ -10,8 +10,7 @@ import pytest
 import smokelift
 from smokelift.checks import Finding
 from smokelift.report import sentences
-from smokelift.report.sentences import SENTENCES, SHORT, VALUES
-from smokelift.report.views import choices, fact, message, sentence
+from smokelift.report.sentences import SENTENCES, SHORT, VALUES, choices, fact, message, sentence
 
 ENGINE = Path(smokelift.__file__).parent
 MAKERS = ("Finding", "background", "camera", "doubt", "source")

@@ -16,7 +16,7 @@ from smokelift.report.facts import boundaries, facts, forecast_of
 from smokelift.report.inspection import inspection_page
 from smokelift.report.page import PAGE_KINDS, write_page
 from smokelift.report.result import expected_shortcomings, made_up
-from smokelift.report.views import choices, fact, sentence
+from smokelift.report.sentences import choices, fact, sentence
 from smokelift.scene import Background, Scene, scene_to_dict
 from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.shot import Shot

@@ -27,7 +27,7 @@ from smokelift.render import device
 from smokelift.report.cost import Workload, estimate_cost, frames_seconds, moment, require_memory
 from smokelift.report.facts import facts, forecast_of
 from smokelift.report.result import count_empty, expected_shortcomings, made_up, shortcomings
-from smokelift.report.views import sentence
+from smokelift.report.sentences import sentence
 from smokelift.scene import Domain
 from smokelift.setup.first_estimate import what_helps
 from smokelift.setup.shot import Shot
