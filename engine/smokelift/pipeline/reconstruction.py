@@ -13,7 +13,7 @@ from smokelift.output.writer import SequenceWriter
 from smokelift.pipeline.carried_state import CarriedState
 from smokelift.pipeline.loop import Frame, frames_after
 from smokelift.pipeline.method import Method, compose, other_parts
-from smokelift.report.result import provenance
+from smokelift.report.facts import provenance
 from smokelift.report.sentences import choices, part
 from smokelift.scene import EnvironmentLight, Scene
 from smokelift.setup.prepare import prepare_shot

@@ -10,7 +10,7 @@ import pytest
 from smokelift import Clip, Settings, Shot
 from smokelift.checks import Finding
 from smokelift.output.images import write_image
-from smokelift.report.result import expected_shortcomings, made_up, provenance, shortcomings
+from smokelift.report.facts import expected_shortcomings, made_up, provenance, shortcomings
 from smokelift.report.sentences import choices, part, sentence
 from smokelift.scene import orbit
 from tests.engine.setup.shots import shot_of

@@ -12,9 +12,8 @@ from smokelift.footage.clip import Clip
 from smokelift.output.images import write_image
 from smokelift.render import device
 from smokelift.report.cost import Workload, estimate_cost, moment
-from smokelift.report.facts import boundaries, facts, forecast_of
+from smokelift.report.facts import boundaries, expected_shortcomings, facts, forecast_of, made_up
 from smokelift.report.inspection import PAGE_KINDS, inspection_page, write_page
-from smokelift.report.result import expected_shortcomings, made_up
 from smokelift.report.sentences import choices, fact, sentence
 from smokelift.scene import Background, Scene, scene_to_dict
 from smokelift.setup.prepare import prepare_shot

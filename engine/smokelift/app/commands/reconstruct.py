@@ -25,8 +25,7 @@ from smokelift.output.writer import check_directory, count_finished, written_kin
 from smokelift.pipeline import Frame, reconstruct
 from smokelift.render import device
 from smokelift.report.cost import Workload, estimate_cost, frames_seconds, moment, require_memory
-from smokelift.report.facts import facts, forecast_of
-from smokelift.report.result import count_empty, expected_shortcomings, made_up, shortcomings
+from smokelift.report.facts import count_empty, expected_shortcomings, facts, forecast_of, made_up, shortcomings
 from smokelift.report.sentences import sentence
 from smokelift.scene import Domain
 from smokelift.setup.first_estimate import what_helps

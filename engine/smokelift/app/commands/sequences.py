@@ -17,7 +17,7 @@ from smokelift.output.index import PICTURES
 from smokelift.output.preview import write_previews
 from smokelift.output.sequence import Sequence
 from smokelift.render import device
-from smokelift.report.result import count_empty, shortcomings
+from smokelift.report.facts import count_empty, shortcomings
 
 
 def check(options: argparse.Namespace, say: Reporter) -> None:
