@@ -4,7 +4,7 @@ import argparse
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
-from smokelift.app.commands import batch, directed, doctor, export, extract, inspect, reconstruct, render, sequences
+from smokelift.app.commands import batch, directed, doctor, extract, inspect, reconstruct, sequences
 from smokelift.app.options import add_sequence
 from smokelift.app.progress import Reporter
 from smokelift.output.vdb import PROXY_TIMES
@@ -27,7 +27,7 @@ COMMANDS: Mapping[str, Command] = {
     "inspect": Command(
         "say what a run would assume, choose and cost, without running it", inspect.run, inspect.add_options
     ),
-    "render": Command("make an image or video of a sequence", render.run, render.add_options),
+    "render": Command("make an image or video of a sequence", sequences.render, sequences.add_render_options),
     "check": Command("check that a sequence is complete and undamaged", sequences.check, add_sequence),
     "preview": Command(
         "make pictures and a video that show the smoke from all sides",
@@ -49,6 +49,8 @@ COMMANDS: Mapping[str, Command] = {
         "make slow motion, fast motion and ramps of a sequence", directed.retime, directed.add_retime_options
     ),
     "loop": Command("make a part of a sequence repeat without a seam", directed.loop, directed.add_loop_options),
-    "export": Command("write small OpenVDB files, a proxy and a USD file", export.run, export.add_options),
+    "export": Command(
+        "write small OpenVDB files, a proxy and a USD file", sequences.export, sequences.add_export_options
+    ),
     "doctor": Command("list versions, devices and what is missing", doctor.run),
 }
