@@ -4,7 +4,7 @@ import argparse
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
-from smokelift.app.commands import batch, directed, doctor, extract, inspect, reconstruct, sequences
+from smokelift.app.commands import batch, clips, directed, doctor, sequences
 from smokelift.app.options import add_sequence
 from smokelift.app.progress import Reporter
 from smokelift.output.vdb import PROXY_TIMES
@@ -19,13 +19,15 @@ class Command(NamedTuple):
 
 
 COMMANDS: Mapping[str, Command] = {
-    "reconstruct": Command("turn a clip or scene file into a VDB sequence", reconstruct.run, reconstruct.add_options),
+    "reconstruct": Command(
+        "turn a clip or scene file into a VDB sequence", clips.reconstruct, clips.add_reconstruct_options
+    ),
     "extract": Command(
-        "separate smoke from what is behind it, as pictures with alpha", extract.run, extract.add_options
+        "separate smoke from what is behind it, as pictures with alpha", clips.extract, clips.add_extract_options
     ),
     "batch": Command("reconstruct a list of shots, as many at a time as memory allows", batch.run, batch.add_options),
     "inspect": Command(
-        "say what a run would assume, choose and cost, without running it", inspect.run, inspect.add_options
+        "say what a run would assume, choose and cost, without running it", clips.inspect, clips.add_inspect_options
     ),
     "render": Command("make an image or video of a sequence", sequences.render, sequences.add_render_options),
     "check": Command("check that a sequence is complete and undamaged", sequences.check, add_sequence),

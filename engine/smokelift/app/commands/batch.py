@@ -9,7 +9,7 @@ from typing import Any
 
 import psutil
 
-from smokelift.app.commands import reconstruct
+from smokelift.app.commands.clips import add_reconstruct_options
 from smokelift.app.options import add_device, named_path, whole_number
 from smokelift.app.progress import Reporter
 from smokelift.batch.plan import Remaining, duration, remaining_work, write_report
@@ -45,7 +45,7 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     """Run the shots that are not finished; ValueError if the list is wrong, or, at the end, if a shot failed."""
     of_a_shot = argparse.ArgumentParser(exit_on_error=False)
     add_device(of_a_shot)
-    reconstruct.add_options(of_a_shot)
+    add_reconstruct_options(of_a_shot)
     records = {shot: read_record(shot) for shot in read_shots(options.list, of_a_shot)}
     unknown = {shot: 0 for shot, record in records.items() if record.forecast is None}
     if unknown:
