@@ -12,9 +12,17 @@ import psutil
 from smokelift.app.commands.clips import add_reconstruct_options
 from smokelift.app.options import add_device, named_path, whole_number
 from smokelift.app.progress import Reporter
-from smokelift.batch.plan import Remaining, duration, remaining_work, write_report
-from smokelift.batch.shots import BatchShot, read_shots
-from smokelift.batch.work import Record, ShotMemory, Task, finish_shot, inspect_shot, read_record, run_here
+from smokelift.batch.shots import (
+    BatchShot,
+    Record,
+    Remaining,
+    duration,
+    read_record,
+    read_shots,
+    remaining_work,
+    write_report,
+)
+from smokelift.batch.work import ShotMemory, Task, finish_shot, inspect_shot, run_here
 from smokelift.checks import counted
 from smokelift.report.cost import memory_free
 
