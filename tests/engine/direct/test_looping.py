@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from smokelift import Sequence, Velocity
-from smokelift.direct.looping import loop_sequence, mix_by_edges, seam
+from smokelift.direct.retiming import loop_sequence, mix_by_edges, seam
 from smokelift.direct.state import SmokeState, read_state
 from smokelift.scene import SIDES, Domain
 from tests.engine.direct import rising

@@ -9,10 +9,16 @@ from smokelift.app.options import add_directed_options, finite_number, frame_ran
 from smokelift.app.progress import Reporter, say_sequence
 from smokelift.checks import Finding
 from smokelift.direct.continuation import CONTRADICTED, DISSOLVED, ROOM, Continuation, continue_sequence
-from smokelift.direct.looping import default_overlap, loop_length, loop_sequence, steady_part
 from smokelift.direct.mesh import Mesh
 from smokelift.direct.new_sequence import Written, open_source
-from smokelift.direct.retiming import playback, retime_sequence
+from smokelift.direct.retiming import (
+    default_overlap,
+    loop_length,
+    loop_sequence,
+    playback,
+    retime_sequence,
+    steady_part,
+)
 from smokelift.direct.surroundings import Ball, BoxObstacle, Fan
 from smokelift.direct.turbulence import Turbulence
 from smokelift.output.index import INDEX, Index
