@@ -11,8 +11,15 @@ import numpy as np
 from smokelift.direct.fitting import BUOYANCY_FRAMES, coarsen_state, fit_simulation, spin_up
 from smokelift.direct.growth import Growth, camera_and_lamp_places, dissolve, in_larger_box, moves
 from smokelift.direct.mesh import Mesh
-from smokelift.direct.new_sequence import MIN_FRAMES, Written, directed_writer, write_copy, write_simulated
-from smokelift.direct.state import SmokeState, read_state
+from smokelift.direct.state import (
+    MIN_FRAMES,
+    SmokeState,
+    Written,
+    directed_writer,
+    read_state,
+    write_copy,
+    write_simulated,
+)
 from smokelift.direct.surroundings import Fan, Obstacle, Surroundings, require_place
 from smokelift.direct.turbulence import Turbulence
 from smokelift.output.archive import ResumeState
@@ -75,7 +82,7 @@ def continue_sequence(
 ) -> Iterator[Written]:
     """Write a sequence up to a frame, and then what a simulation makes of it.
 
-    Arguments and what it yields are those of `smokelift.direct.new_sequence.directed_writer`. It is a ValueError if
+    Arguments and what it yields are those of `smokelift.direct.state.directed_writer`. It is a ValueError if
     there is no such frame to start from, or too few before it, a fan or an obstacle is not in the box, eddies are
     too small for the voxels, or a file cannot be read or written.
     """

@@ -10,8 +10,16 @@ from pathlib import Path
 import numpy as np
 
 from smokelift.checks import Doubles
-from smokelift.direct.new_sequence import MIN_FRAMES, Written, directed_writer, write_copy, write_simulated
-from smokelift.direct.state import SmokeState, interpolate, read_state
+from smokelift.direct.state import (
+    MIN_FRAMES,
+    SmokeState,
+    Written,
+    directed_writer,
+    interpolate,
+    read_state,
+    write_copy,
+    write_simulated,
+)
 from smokelift.output.sequence import Sequence
 from smokelift.scene import Side
 from smokelift.scene.domain import open_sides
@@ -56,7 +64,7 @@ def retime_sequence(
     """Write a sequence at another speed: frames between the clip's own are interpolated from both neighbors.
 
     Velocities are scaled with the speed: at half the speed they are half of the smoke's. Speeds are those of
-    `playback`, further arguments and what it yields those of `smokelift.direct.new_sequence.directed_writer`. It is
+    `playback`, further arguments and what it yields those of `smokelift.direct.state.directed_writer`. It is
     a ValueError if a file cannot be read or written.
     """
     times, speeds_shown = playback(len(sequence.frames), speeds)
@@ -134,7 +142,7 @@ def loop_sequence(
     back, and the two are mixed. So shapes move to where they have to be, and do not fade out in one place and in at
     another. Smoke that only one of them has comes and goes by its edges.
 
-    Further arguments and what it yields are those of `smokelift.direct.new_sequence.directed_writer`. It is a
+    Further arguments and what it yields are those of `smokelift.direct.state.directed_writer`. It is a
     ValueError as by `loop_length`, or if a file cannot be read or written.
     """
     length = loop_length(sequence, first, last, overlap)

@@ -8,7 +8,7 @@ from command_line import command, events_of, names, refused
 
 from smokelift.app.commands import directed
 from smokelift.direct.continuation import CONTRADICTED, ROOM, Continuation, continue_sequence
-from smokelift.direct.new_sequence import open_source
+from smokelift.direct.state import open_source
 from smokelift.report import cost
 from tests.engine.output.small_sequence import needs_vdb
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from smokelift.direct.continuation import Continuation
-from smokelift.direct.new_sequence import open_source
 from smokelift.direct.retiming import loop_sequence, retime_sequence
+from smokelift.direct.state import open_source
 from smokelift.direct.surroundings import Ball, Fan
 from smokelift.output.index import SequenceError
 from smokelift.output.sequence import Sequence

@@ -10,7 +10,6 @@ from smokelift.app.progress import Reporter, say_sequence
 from smokelift.checks import Finding
 from smokelift.direct.continuation import CONTRADICTED, DISSOLVED, ROOM, Continuation, continue_sequence
 from smokelift.direct.mesh import Mesh
-from smokelift.direct.new_sequence import Written, open_source
 from smokelift.direct.retiming import (
     default_overlap,
     loop_length,
@@ -19,6 +18,7 @@ from smokelift.direct.retiming import (
     retime_sequence,
     steady_part,
 )
+from smokelift.direct.state import Written, open_source
 from smokelift.direct.surroundings import Ball, BoxObstacle, Fan
 from smokelift.direct.turbulence import Turbulence
 from smokelift.output.index import INDEX, Index
