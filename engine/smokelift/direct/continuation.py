@@ -20,8 +20,7 @@ from smokelift.direct.state import (
     write_copy,
     write_simulated,
 )
-from smokelift.direct.surroundings import Fan, Obstacle, Surroundings, require_place
-from smokelift.direct.turbulence import Turbulence
+from smokelift.direct.surroundings import Fan, Obstacle, Surroundings, Turbulence, require_place
 from smokelift.output.archive import ResumeState
 from smokelift.output.sequence import Sequence
 from smokelift.output.writer import SequenceWriter

@@ -5,7 +5,7 @@ simulation that starts from it makes threads. So the simulation runs along the c
 the first frame alone, and at each frame the clip's density (direct insertion: Charney, Halem and Jastrow, "Use of
 incomplete historical data to infer the present state of the atmosphere", 1969). The density's detail turns the air
 around it, so that eddies come in on every scale that the clip shows. Small ones that are still missing are made up
-(`smokelift.direct.turbulence`).
+(`smokelift.direct.simulation.with_small_eddies`).
 
 The buoyancy is the one whose velocity moves the smoke up as the clip does: each frame is carried on for a step, and
 compared with the next one in the picture. What rises there is the pattern of the smoke, not its center of mass, which
@@ -23,11 +23,10 @@ import numpy as np
 from scipy import ndimage
 
 from smokelift.checks import Mask
-from smokelift.direct.inflow import Inflow, find_inflow
-from smokelift.direct.simulation import Combustion, Physics, Simulation
+from smokelift.direct.inflow import find_inflow
+from smokelift.direct.simulation import Combustion, Inflow, Physics, Simulation, small_eddy_speed, with_small_eddies
 from smokelift.direct.state import SmokeState
 from smokelift.direct.surroundings import Surroundings
-from smokelift.direct.turbulence import small_eddy_speed, with_small_eddies
 from smokelift.transport import Array, Velocity, advect, at_centres, project
 from smokelift.velocity.pyramid import coarsen_density, coarsen_velocity
 

@@ -9,8 +9,6 @@ smoke that is faster than the velocity looks like a wide, weak one.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -18,10 +16,9 @@ from scipy import ndimage
 
 import smokelift._core as _core
 from smokelift.checks import Mask
+from smokelift.direct.simulation import Inflow
 from smokelift.direct.state import SmokeState
-from smokelift.scene.domain import box_around
-from smokelift.transport import Array, advect, faces_in
-from smokelift.transport.constraint import FaceMasks, faces_of
+from smokelift.transport import Array, advect
 from smokelift.velocity.linearization import SMOKE_THRESHOLD
 
 BLUR_VOXELS = 2.0
@@ -51,60 +48,6 @@ MIN_RESIDUAL_FRACTION = np.float32(1e-4)
 
 MARGIN_VOXELS = 1
 """Voxels around an inlet that belong to it: its smoke is taken from the clip until it is outside."""
-
-
-@dataclass(frozen=True, eq=False)
-class Inflow:
-    """The inlets, and the frames of the clip that are replayed in them.
-
-    Forwards and backwards in turn, so that no frame jumps and the statistics stay those of the clip.
-    """
-
-    voxels: Mask
-    """(nx, ny, nz) bool: those of all inlets, in a box around them."""
-    states: Sequence[SmokeState]
-    """Of the clip, in their order, in that box."""
-    first: tuple[int, ...] = (0, 0, 0)
-    """The simulation's voxel at which that box begins."""
-
-    def at(self, step: int) -> SmokeState:
-        """The state that is replayed so many steps after the last one."""
-        last = len(self.states) - 1
-        return self.states[abs(last - step % (2 * last))] if last else self.states[0]
-
-    @property
-    def box(self) -> tuple[slice, ...]:
-        """The box around the inlets in the simulation's voxels."""
-        return tuple(slice(first, first + n) for first, n in zip(self.first, self.voxels.shape, strict=True))
-
-    @cached_property
-    def faces(self) -> FaceMasks:
-        """The faces of the inlets' voxels, in their box."""
-        return faces_of(self.voxels)
-
-    def density_into(self, density: Array, step: int, solid: Mask | None) -> None:
-        """Set the density (nx, ny, nz) in the inlets to what enters, outside of what is solid."""
-        inlets = self.voxels if solid is None else self.voxels & ~solid[self.box]
-        density[self.box][inlets] = self.at(step).density[inlets]
-
-    def velocity_into(self, faces: Sequence[Array], step: int) -> None:
-        """Set the velocity on the faces of the inlets to that of what enters."""
-        x, y, z = faces
-        for here, inlets, entering in zip(
-            faces_in((x, y, z), self.box), self.faces, self.at(step).velocity.faces, strict=True
-        ):
-            here[inlets] = entering[inlets]
-
-    def cropped(self) -> "Inflow":
-        """Inflow in the smallest box."""
-        box = box_around(self.voxels, 0)
-        if not self.voxels.any():
-            box = (slice(0, 1),) * 3  # a box has a voxel at least
-        states = [
-            SmokeState(m.density[box].copy(), m.velocity.with_faces(u.copy() for u in faces_in(m.velocity.faces, box)))
-            for m in self.states
-        ]
-        return Inflow(self.voxels[box], states, tuple(a + side.start for a, side in zip(self.first, box, strict=True)))
 
 
 def find_inflow(states: Sequence[SmokeState], dt: float, marked: Mask | None = None) -> Inflow:

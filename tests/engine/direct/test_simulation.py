@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from smokelift.direct.fitting import fit_simulation
-from smokelift.direct.inflow import Inflow
-from smokelift.direct.simulation import Physics, Simulation
+from smokelift.direct.simulation import Inflow, Physics, Simulation
 from smokelift.direct.state import SmokeState
 from smokelift.direct.surroundings import Ball, Surroundings
 from smokelift.transport import divergence

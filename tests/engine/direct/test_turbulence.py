@@ -5,11 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from smokelift.direct.inflow import Inflow
-from smokelift.direct.simulation import Physics, Simulation
+from smokelift.direct.simulation import INTENSITY, Inflow, Physics, Simulation, small_eddy_speed, with_small_eddies
 from smokelift.direct.state import SmokeState
-from smokelift.direct.surroundings import Surroundings
-from smokelift.direct.turbulence import INTENSITY, Turbulence, small_eddy_speed, with_small_eddies
+from smokelift.direct.surroundings import Surroundings, Turbulence
 from smokelift.transport import Velocity, at_centres, divergence, project
 from tests.engine.direct.rising import DT, course
 

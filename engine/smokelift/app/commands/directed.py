@@ -19,8 +19,7 @@ from smokelift.direct.retiming import (
     steady_part,
 )
 from smokelift.direct.state import Written, open_source
-from smokelift.direct.surroundings import Ball, BoxObstacle, Fan
-from smokelift.direct.turbulence import Turbulence
+from smokelift.direct.surroundings import Ball, BoxObstacle, Fan, Turbulence
 from smokelift.output.index import INDEX, Index
 from smokelift.output.sequence import Sequence
 from smokelift.report.cost import affordable_room
