@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from smokelift.direct.inflow import find_inflow, inlet_score
+from smokelift.direct.fitting import find_inflow, inlet_score
 from smokelift.direct.simulation import Inflow
 from smokelift.direct.state import SmokeState
 from smokelift.direct.surroundings import Ball
