@@ -6,8 +6,17 @@ import numpy as np
 import pytest
 
 from smokelift import PointLight, advect
-from smokelift.direct.continuation import DISSOLVED, Continuation
-from smokelift.direct.growth import BLOCK, MARGIN_VOXELS, Growth, camera_and_lamp_places, dissolve, in_larger_box, moves
+from smokelift.direct.continuation import (
+    BLOCK,
+    DISSOLVED,
+    MARGIN_VOXELS,
+    Continuation,
+    Growth,
+    camera_and_lamp_places,
+    dissolve,
+    in_larger_box,
+    moves,
+)
 from smokelift.direct.state import SmokeState, open_source
 from smokelift.direct.surroundings import Surroundings, Turbulence
 from tests.engine.direct.rising import DOMAIN, DT, SCENE, along_x, at_rest, blob, run, run_twice
