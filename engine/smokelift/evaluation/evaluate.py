@@ -8,11 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from smokelift.checks import counted
-from smokelift.evaluation.frame_means import Figures, means, picture_figures, volume_means
 from smokelift.evaluation.orbit import Orbit
 from smokelift.evaluation.orbit_scores import orbit_scores
 from smokelift.evaluation.reference_view import ReferenceView, first_frame, open_views
-from smokelift.evaluation.truth import Truth, on_grid, resampled
+from smokelift.evaluation.truth import Figures, Truth, means, on_grid, picture_figures, resampled, volume_means
 from smokelift.output.images import eight_bit, write_sheet
 from smokelift.output.sequence import Sequence, Viewer
 from smokelift.render import Volume

@@ -11,9 +11,9 @@ import numpy as np
 from scipy import ndimage
 
 from smokelift.density.turntable import Turntable
-from smokelift.evaluation.frame_means import finite_mean
 from smokelift.evaluation.metrics import PatchStatistics, RayShapes, flicker, mean_gradient
 from smokelift.evaluation.orbit import Orbit
+from smokelift.evaluation.truth import finite_mean
 from smokelift.render import Volume
 from smokelift.scene import CompleteScene
 from smokelift.transport import Array
