@@ -18,7 +18,7 @@ from benchmarks.baked import BLACK
 from benchmarks.process import apart
 from smokelift import Scene
 from smokelift.evaluation import metrics
-from smokelift.evaluation.orbit_scores import SHAPES, orbit_scores
+from smokelift.evaluation.orbit import SHAPES, orbit_scores
 from smokelift.evaluation.truth import (
     Truth,
     eight_bit_values,

@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from smokelift.checks import counted
-from smokelift.evaluation.orbit import Orbit
-from smokelift.evaluation.orbit_scores import orbit_scores
+from smokelift.evaluation.orbit import Orbit, orbit_scores
 from smokelift.evaluation.truth import Figures, Truth, means, on_grid, picture_figures, resampled, volume_means
 from smokelift.extraction.given_background import background_picture, open_plates
 from smokelift.footage.clip import Clip

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from smokelift.evaluation.orbit_scores import AZIMUTHS, BANDS, SHAPES, orbit_scores
+from smokelift.evaluation.orbit import AZIMUTHS, BANDS, SHAPES, orbit_scores
 
 FRAMES = 3
 
