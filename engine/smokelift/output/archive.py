@@ -113,9 +113,8 @@ def _array(
         raise ValueError(f"{info.filename} cannot have the shape {shape}")
     with archive.open(info) as file:
         values: npt.NDArray[Any] = np.lib.format.read_array(file)  # type: ignore[no-untyped-call]  # NumPy's
-    if (
-        kind.kind == "f" and values.size and not float(np.abs(values).max()) <= MAX_MAGNITUDE
-    ):  # 16 bits cannot hold the bound
+    # as a float of Python, since 16 bits cannot hold the bound
+    if kind.kind == "f" and values.size and not float(np.abs(values).max()) <= MAX_MAGNITUDE:
         raise ValueError(f"{info.filename} holds values that are not finite, or beyond {MAX_MAGNITUDE:g}")
     return values
 

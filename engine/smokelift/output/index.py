@@ -12,10 +12,11 @@ import os
 import platform
 import re
 import sys
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from importlib.metadata import PackageNotFoundError, version
+from itertools import starmap
 from pathlib import Path
 from statistics import median
 from typing import Any, get_origin, get_type_hints
@@ -102,21 +103,19 @@ class Lock:
         It raises OSError if the file cannot be made, or its file system has no locks.
         """
         while True:
-            file = os.open(self._path, os.O_RDWR | os.O_CREAT, 0o644)
+            file, taken = os.open(self._path, os.O_RDWR | os.O_CREAT, 0o644), False
             try:
-                free = _try_lock(file)
-            except OSError:
-                os.close(file)
-                raise
-            if not free:
-                os.close(file)
-                return False
-            # The run that had it before may delete the file after we open it and before we lock it.
-            with suppress(FileNotFoundError):
-                if os.path.samestat(os.fstat(file), self._path.stat()):
+                if not _try_lock(file):
+                    return False
+                # The run that had it before may delete the file after we open it and before we lock it.
+                with suppress(FileNotFoundError):
+                    taken = os.path.samestat(os.fstat(file), self._path.stat())
+                if taken:
                     self._file = file
                     return True
-            os.close(file)
+            finally:
+                if not taken:
+                    os.close(file)
 
     def release(self) -> None:
         """Free the lock and delete its file."""
@@ -154,6 +153,10 @@ class SequenceError(ValueError):
     """A directory that cannot be written to or opened, and why."""
 
 
+class DirectoryBusyError(SequenceError):
+    """A directory that another run is writing into."""
+
+
 def directory_path(value: object) -> Path:
     """Return what is given as the directory of a sequence, or raise a SequenceError."""
     try:
@@ -162,12 +165,7 @@ def directory_path(value: object) -> Path:
         raise SequenceError(str(error)) from error
 
 
-class DirectoryBusyError(SequenceError):
-    """A directory that another run is writing into."""
-
-
-def software_versions() -> dict[str, str]:
-    """Return the versions of what a result depends on."""
+def _software_versions() -> dict[str, str]:
     versions = {"python": platform.python_version()}
     for name in ("smokelift", "numpy", "scipy", "taichi", "av"):
         with suppress(PackageNotFoundError):
@@ -199,8 +197,8 @@ class Index:
     """Whether the run came to its end."""
     start_number: int = 1
     """Number in the names of the files of frame 1."""
-    versions: dict[str, Any] = field(default_factory=software_versions)
-    """Of the software."""
+    versions: dict[str, Any] = field(default_factory=_software_versions)
+    """Of what a result depends on."""
 
     @property
     def numbers(self) -> tuple[int, ...]:
@@ -289,52 +287,47 @@ def json_value(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def without_folders(scene: Any) -> Any:
-    """Return the plain values of a scene with the names of its files in place of their paths."""
+def first_change(before: Index, now: Index) -> str:
+    """Return in words the first thing that differs between two runs and has to be the same, or an empty string."""
+    pairs = zip(_compared(before), _compared(now), strict=True)
+    return next(filter(None, (_difference(name, there, here) for (name, there), (_, here) in pairs)), "")
+
+
+def _compared(index: Index) -> Iterator[tuple[str, Any]]:
+    """What is compared, with the name that is said. Causes come before what follows from them.
+
+    Another clip, say, makes another scene, and another scene other settings of a part.
+    """
+    yield "sources", index.sources
+    # those of the whole run: settings of its parts follow from a scene too
+    yield "settings", {key: value for key, value in index.settings.items() if not isinstance(value, dict)}
+    yield "start_number", index.start_number
+    # checksums distinguish the files, wherever a project was moved to
+    yield "scene", _without_folders(index.scene) if index.sources else index.scene
+    yield "settings", index.settings
+    # a patch of Python changes no result
+    yield "versions", {name: found for name, found in index.versions.items() if name != "python"}
+
+
+def _without_folders(scene: Any) -> Any:
+    """The plain values of a scene with the names of its files in place of their paths."""
     if isinstance(scene, dict):
         return {
-            key: Path(value).name if key in FILES and isinstance(value, str) else without_folders(value)
+            key: Path(value).name if key in FILES and isinstance(value, str) else _without_folders(value)
             for key, value in scene.items()
         }
-    return [without_folders(value) for value in scene] if isinstance(scene, list) else scene
+    return [_without_folders(value) for value in scene] if isinstance(scene, list) else scene
 
 
-def _scene(index: Index) -> Any:
-    """A scene as it is compared: the checksums of its files distinguish them, wherever a project was moved to."""
-    return without_folders(index.scene) if index.sources else index.scene
-
-
-COMPARED: tuple[tuple[str, Callable[[Index], Any]], ...] = (
-    ("sources", lambda index: index.sources),
-    # those of the whole run: settings of its parts follow from a scene too
-    ("settings", lambda index: {key: value for key, value in index.settings.items() if not isinstance(value, dict)}),
-    ("start_number", lambda index: index.start_number),
-    ("scene", _scene),
-    ("settings", lambda index: index.settings),
-    # a patch of Python changes no result
-    ("versions", lambda index: {name: found for name, found in index.versions.items() if name != "python"}),
-)
-"""What has to be the same where a run goes on: the name that is said, and what of an index is compared. Causes come
-before what follows from them: another clip, say, makes another scene, and another scene other settings of a part."""
-
-
-def first_change(before: Index, now: Index) -> str:
-    """Return in words the first thing of `COMPARED` that differs between two runs, or an empty string."""
-    return next(filter(None, (difference(name, of(before), of(now)) for name, of in COMPARED)), "")
-
-
-def difference(place: str, there: Any, now: Any) -> str:
-    """Return the first difference between two plain values as words, or an empty string."""
+def _difference(place: str, there: Any, now: Any) -> str:
+    """The first difference between two plain values as words, or an empty string."""
     if isinstance(there, dict) and isinstance(now, dict):
-        for key in there | now:
-            found = difference(f"{place}.{key}", there.get(key), now.get(key))
-            if found:
-                return found
+        parts = [(f"{place}.{key}", there.get(key), now.get(key)) for key in there | now]
+    elif isinstance(there, list) and isinstance(now, list) and len(there) == len(now):
+        parts = [(f"{place}[{n}]", *pair) for n, pair in enumerate(zip(there, now, strict=True))]
+    elif there == now:
         return ""
-    if isinstance(there, list) and isinstance(now, list) and len(there) == len(now):
-        parts = (difference(f"{place}[{n}]", *pair) for n, pair in enumerate(zip(there, now, strict=True)))
-        return next(filter(None, parts), "")
-    if there == now:
-        return ""
-    before, after = (text if len(text) <= 60 else f"{text[:57]}..." for text in map(json.dumps, (there, now)))
-    return f"{place} was {before} and is now {after}"
+    else:
+        before, after = (text if len(text) <= 60 else f"{text[:57]}..." for text in map(json.dumps, (there, now)))
+        return f"{place} was {before} and is now {after}"
+    return next(filter(None, starmap(_difference, parts)), "")

@@ -238,7 +238,7 @@ def test_a_directory_has_one_run_and_the_lock_of_a_killed_one_is_none(tmp_path, 
     assert finished(tmp_path) == (1,) and LOCK not in names(tmp_path)
 
 
-@pytest.mark.parametrize("kind", ["writer.write_arrays", "index.Index.write", "resume.ResumeState.write"])
+@pytest.mark.parametrize("kind", ["writer.write_arrays", "index.Index.write", "archive.ResumeState.write"])
 def test_a_full_disk_counts_the_frames_that_stay(tmp_path, no_vdb, monkeypatch, kind) -> None:
     def full(*arguments: Any) -> None:
         raise OSError(28, "No space left on device")
