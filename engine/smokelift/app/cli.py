@@ -16,7 +16,7 @@ from typing import Any, NoReturn
 from smokelift._core import set_threads
 from smokelift.app.commands import COMMANDS
 from smokelift.app.options import add_device, whole_number
-from smokelift.app.progress import OutputError, reporter
+from smokelift.app.progress import JsonReporter, OutputError, Reporter
 from smokelift.checks import printable
 from smokelift.footage.image_files import READABLE
 from smokelift.output.index import DISK_FULL, DirectoryBusyError
@@ -85,7 +85,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(options: argparse.Namespace, hint: str) -> int:
-    say = reporter(options.progress)
+    say = JsonReporter() if options.progress == "json" else Reporter()
     set_threads(options.threads)
     try:
         try:
