@@ -87,7 +87,6 @@ def read_shots(path: Path, parser: argparse.ArgumentParser) -> tuple[BatchShot, 
 
 
 def _words(file: TomlFile, place: Place, key: str, value: Any) -> list[str]:
-    """The words of the command line that say an option."""
     if key == "npz" and isinstance(value, bool):
         return ["--npz"] * value
     if key == "mask":

@@ -245,7 +245,6 @@ def _octaves(velocity: Velocity) -> Iterator[tuple[float, list[Array]]]:
 
 
 def _in_smoke(density: Array) -> Array:
-    """1 in the smoke, 0 elsewhere."""
     return np.asarray((density > MIN_DENSITY_FRACTION * density.max()).astype(np.float32))
 
 

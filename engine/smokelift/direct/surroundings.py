@@ -220,7 +220,6 @@ class Surroundings:
 
     @cached_property
     def _at_rest(self) -> Mask:
-        """The voxels of the obstacles that do not move."""
         assert self.domain is not None
         voxels: Mask = np.zeros(self.domain.shape, bool)
         for obstacle in self.obstacles:

@@ -222,7 +222,6 @@ def _true_density(sequence: Sequence, truth: Truth, number: int) -> Volume:
 
 
 def _volumes(sequence: Sequence) -> Iterator[tuple[int, Volume, Volume | None]]:
-    """The frames as `volume_means` takes them."""
     for number in sequence.frames:
         # the first frame's velocity is the second's
         velocity = sequence.velocity_at_centres(number) if number > sequence.frames[0] else None

@@ -177,7 +177,6 @@ def orbit_scores(
 def _add_distances(
     figures: dict[str, list[list[float | None]]], found: list[PatchStatistics], references: list[PatchStatistics]
 ) -> None:
-    """Add the distances of a frame's pictures."""
     pairs = list(zip(found, references, strict=True))
     figures["patches"].append([one.distance(reference) for one, reference in pairs])
     figures["texture"].append([one.texture_distance(reference) for one, reference in pairs])

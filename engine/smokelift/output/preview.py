@@ -224,7 +224,6 @@ class Preview:
         return np.asarray(plate.mean((0, 1)) if absorbs else np.zeros(3), np.float32)
 
     def _rendered(self, number: int, viewers: Rows[Viewer]) -> list[Image]:
-        """A frame as each viewer shows it."""
         volumes = self.sequence.density(number), self.sequence.flame(number)
         return [viewer.image(number, *volumes) for viewer in viewers]
 

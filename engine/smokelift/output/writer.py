@@ -199,7 +199,6 @@ class SequenceWriter:
             raise self._write_error(f"frame {number}", error) from error
 
     def _path(self, number: int, kind: str) -> Path:
-        """The file of a frame."""
         return frame_path(self.directory, self._index.file_number(number), kind)
 
     def _take_over(self) -> None:

@@ -204,12 +204,19 @@ def _frame(
     fitted, taken_over = _density(views, before, predicted, shot, method)
     picture = _flow_picture(views) if flow else None
     flame = _flame(index, fitted.density, shot)
-    fit = _fit_figures(index, fitted, shot)
+    # what a fit calls psnr is that of the working pictures; frames without smoke have none, and cost nothing
+    fit = {name.replace("psnr", "psnr_working"): value for name, value in fitted.figures.items()}
+    if "psnr_working" in fit:
+        fit = {**clip_psnr(shot, index, fitted.density), **fit}
     fit_done = time.perf_counter()
     if before is None:
         velocity = estimated = Velocity.zero(domain.resolution, domain.voxel_size, shot.scene.closed)
     else:
-        pair = DensityPair(*_measured(before, fitted), dt, domain.voxel_size, shot.scene.closed, shot.scene.inflow())
+        # without what is made up, if that is known of both: it shows no motion of its own
+        first, second = before.smooth_density, fitted.smooth_density
+        if first is None or second is None:
+            first, second = before.density, fitted.density
+        pair = DensityPair(first, second, dt, domain.voxel_size, shot.scene.closed, shot.scene.inflow())
         pictures = None
         if views is not None and before.picture is not None and picture is not None:
             pictures = PicturePair(before.picture, picture, views.views[0].camera, domain)
@@ -239,21 +246,6 @@ def _seen(index: int, shot: Shot) -> ViewSet | None:
 def _flow_picture(views: ViewSet | None) -> Picture | None:
     """What optical flow is found in: roots of the only camera's optical depths, so that thin smoke counts."""
     return None if views is None else np.sqrt(views.views[0].optical_depth)
-
-
-def _fit_figures(index: int, fitted: FittedDensity, shot: Shot) -> dict[str, float]:
-    """The figures of a fit; what it calls ``psnr`` is that of the working pictures."""
-    working = {name.replace("psnr", "psnr_working"): value for name, value in fitted.figures.items()}
-    if "psnr_working" not in working:  # frames without smoke cost nothing
-        return working
-    return {**clip_psnr(shot, index, fitted.density), **working}
-
-
-def _measured(before: CarriedState, fitted: FittedDensity) -> tuple[Volume, Volume]:
-    """The densities of two frames, without what is made up if that is known of both: it shows no motion of its own."""
-    if before.smooth_density is None or fitted.smooth_density is None:
-        return before.density, fitted.density
-    return before.smooth_density, fitted.smooth_density
 
 
 def _density(

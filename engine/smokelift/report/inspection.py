@@ -177,7 +177,6 @@ def _line(draw: ImageDraw.ImageDraw, camera: Camera, points: Doubles, color: Col
 
 
 def _histogram(picture: Array, plate: Plate, seen: Matte) -> Tile:
-    """Histogram of sRGB values, on a logarithmic scale."""
     width, height = TILE[0], TILE[0] // 2
     shown = Image.new("RGB", (width, height), (12, 12, 14))
     draw = ImageDraw.Draw(shown)
@@ -242,7 +241,6 @@ def _table_row(line: Mapping[str, str]) -> NDArray[np.uint8]:
 
 
 def _side_by_side(panels: Sequence[Panel]) -> NDArray[np.uint8]:
-    """Pictures with their titles above them."""
     height = max(panel.picture.shape[0] for panel in panels) + _LINE + _GAP
     strip = Image.new("RGB", (_WIDTH, height), _PAPER)
     for column, panel in enumerate(panels):
@@ -292,7 +290,6 @@ def _as_html(page: Page) -> str:
 
 
 def _data(picture: NDArray[np.uint8]) -> str:
-    """A picture as a data URL."""
     file = io.BytesIO()
     Image.fromarray(picture).save(file, format="PNG", compress_level=PNG_COMPRESSION)
     return f"data:image/png;base64,{base64.b64encode(file.getvalue()).decode('ascii')}"

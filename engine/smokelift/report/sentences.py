@@ -428,7 +428,6 @@ def _rounded(figure: Any) -> Any:
 
 
 def _figures(finding: Finding) -> dict[str, Any]:
-    """What words fill in."""
     known = {"what": finding.about.capitalize(), "value": finding.value, "spread": finding.spread}
     return {**finding.figures, **{name: figure for name, figure in known.items() if figure not in ("", None)}}
 

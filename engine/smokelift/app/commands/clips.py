@@ -187,7 +187,6 @@ def extract(options: argparse.Namespace, say: Reporter) -> None:
 
 
 def _write_preview(path: Path, extraction: pipeline.Extraction) -> None:
-    """Write the clip beside its element over a checker."""
     width, height = extraction.clip.size
     side = max(1, -(-max(width, height) // SQUARES))
     rows, columns = np.mgrid[:height, :width] // side

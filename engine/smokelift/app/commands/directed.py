@@ -99,7 +99,6 @@ def add_continue_options(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_repeatable(parser: argparse.ArgumentParser, option: str, values: tuple[str, ...], what: str) -> None:
-    """Add an option of some numbers, which may be given again."""
     parser.add_argument(
         option,
         type=finite_number,
