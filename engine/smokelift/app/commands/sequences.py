@@ -148,14 +148,14 @@ def render(options: argparse.Namespace, say: Reporter) -> None:
     if not sequence.frames:
         raise ValueError(f"{options.directory}: there are no finished frames to render yet.")
     device.start(options.device)
-    if options.out.suffix.lower() in VIDEO_KINDS:
-        numbers = sequence.frames if options.frame is None else (options.frame,)
-        viewer = Viewer(scene, camera)
-        volumes = ((number, sequence.density(number), sequence.flame(number)) for number in numbers)
-        write_video(options.out, (viewer.image(*each) for each in volumes), sequence.fps)
+    is_video = options.out.suffix.lower() in VIDEO_KINDS
+    numbers = (sequence.frames if is_video else sequence.frames[:1]) if options.frame is None else (options.frame,)
+    viewer = Viewer(scene, camera)
+    pictures = (viewer.image(number, sequence.density(number), sequence.flame(number)) for number in numbers)
+    if is_video:
+        write_video(options.out, pictures, sequence.fps)
     else:
-        number = sequence.frames[0] if options.frame is None else options.frame
-        write_image(options.out, sequence.render(number, camera))
+        write_image(options.out, next(pictures))
     say.finish(f"{options.out} written.", {"file": str(options.out)})
 
 
