@@ -84,7 +84,7 @@ def test_one_picture_alone_is_enough_before_one_color(plume, tmp_path, capsys) -
 
 
 def test_what_is_made_up_is_chosen_said_and_kept(shot, tmp_path, capsys) -> None:
-    out, words = tmp_path / "out", ("--npz", "--frames", "0:0", "--detail", "0.5", *QUICK)
+    out, words = tmp_path / "out", (*QUICK, "--npz", "--frames", "0:0", "--detail", "0.5")
     assert command("reconstruct", shot, "--out", out, "--seed", "3", *words) == 0
     sequence = Sequence.open(out)
     assert (sequence.settings["detail"], sequence.settings["seed"]) == (0.5, 3)
@@ -96,7 +96,7 @@ def test_what_is_made_up_is_chosen_said_and_kept(shot, tmp_path, capsys) -> None
 
 def test_scattering_and_resolution_by_option(shot, tmp_path, capsys) -> None:
     out = tmp_path / "out"
-    arguments = ("--npz", "--frames", "0:0", "--resolution", "auto", "--scattering", "unshadowed")
+    arguments = ("--npz", "--frames", "0:0", "--detail", "0", "--resolution", "auto", "--scattering", "unshadowed")
     assert command("reconstruct", shot, "--out", out, *arguments) == 0
     sequence = Sequence.open(out)
     assert sequence.scene.scattering == "unshadowed"
@@ -104,7 +104,7 @@ def test_scattering_and_resolution_by_option(shot, tmp_path, capsys) -> None:
     assert (by_hand["scattering"], by_hand["resolution"]) == (True, False)
     assert max(sequence.scene.domain.resolution) > 32
     assert command("reconstruct", shot, "--out", out, "--resume", *arguments) == 0
-    said = refused(capsys, "reconstruct", shot, "--out", out, "--resume", *arguments[:5])
+    said = refused(capsys, "reconstruct", shot, "--out", out, "--resume", *arguments[:7])
     assert "settings.scattering was" in said
 
 
@@ -156,11 +156,11 @@ def test_a_directory_and_a_video_are_taken_too(before_wall, tmp_path) -> None:
         assert sum(1 for _ in video.decode(video=0)) == 3
 
 
-def test_an_element_is_reconstructed_again(before_wall, draft, tmp_path) -> None:
+def test_an_element_is_reconstructed_again(before_wall, smooth, tmp_path) -> None:
     assert command("extract", before_wall, "--frames", "1:1", "--out", tmp_path / "element_####.exr") == 0
     scene = replace(Scene.load(before_wall), clip=None, background=None)
     with Clip.open(tmp_path / "element_####.exr", fps=24) as clip:
-        (frame,) = reconstruct(clip, scene, draft)
+        (frame,) = reconstruct(clip, scene, smooth)
     assert frame.figures["psnr"] > 30
 
 
@@ -248,7 +248,7 @@ def test_a_clip_without_smoke_has_a_page_that_says_so(plume, tmp_path, capsys) -
 
 def test_a_scene_of_all_estimates_gives_the_same_smoke(plume, tmp_path, capsys) -> None:
     clip, scene = plume.scene.clip.path, tmp_path / "scene.toml"
-    words = ("--frames", "0:2", "--detail", "0", *QUICK)
+    words = ("--frames", "0:2", *QUICK)
     assert command("inspect", clip, "--write", scene, *words) == 0
     assert "# ambient fraction: all light is from everywhere (undetermined)" in scene.read_text(encoding="utf-8")
     for name, source in (("own", clip), ("written", scene)):
@@ -272,7 +272,7 @@ def test_a_background_that_is_a_picture_is_found_again(tmp_path) -> None:
         smoke = (0.7 + 0.2 * np.sin(1.3 * n)) * np.clip(1.5 - np.minimum(rising, staying), 0, 1)[..., None]
         write_image(tmp_path / "clip" / f"frame_{n:04d}.png", wall * (1 - smoke) + 0.8 * smoke)
     clip, scene = tmp_path / "clip" / "frame_####.png", tmp_path / "scene.toml"
-    words = ("--frames", "6:6", "--detail", "0", *QUICK)
+    words = ("--frames", "6:6", *QUICK)
     assert command("inspect", clip, "--write", scene, *words) == 0
     assert Scene.load(scene).background is None
     given = tmp_path / "given.toml"
