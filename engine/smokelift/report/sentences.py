@@ -403,16 +403,15 @@ def choices(findings: Iterable[Finding]) -> list[dict[str, Any]]:
 
 def _choice(finding: Finding) -> dict[str, Any]:
     """A choice as JSON holds it, with four digits, since further ones decide nothing."""
-    known = {name: figure for name, figure in finding.figures.items() if name != "tolerance"}
-    if finding.spread is not None:
-        known["spread"] = finding.spread
+    figures = {**finding.figures, "spread": finding.spread}
+    tolerance = figures.pop("tolerance", None)
     return {
         "what": finding.about,
         "chosen": list(map(_rounded, finding.value)) if isinstance(finding.value, tuple) else _rounded(finding.value),
         "kind": finding.kind,
         "reason": sentence(finding),
-        "measured": {name: _rounded(figure) for name, figure in known.items() if isinstance(figure, float | int)},
-        "tolerance": finding.figures.get("tolerance"),
+        "measured": {name: _rounded(figure) for name, figure in figures.items() if isinstance(figure, float | int)},
+        "tolerance": tolerance,
         "by_hand": finding.source == "given",
     }
 
@@ -432,15 +431,10 @@ def _figures(finding: Finding) -> dict[str, Any]:
     return {**finding.figures, **{name: figure for name, figure in known.items() if figure not in ("", None)}}
 
 
-def _filled(words: str, finding: Finding) -> str:
-    return _Words().vformat(words, (), _figures(finding))
-
-
 class _Words(Formatter):
-    """Fills figures in, by the formats of `smokelift.report.sentences`."""
+    """Fills figures in, by the formats of this module."""
 
     def format_field(self, value: Any, format_spec: str) -> str:
-        """Return a figure in words."""
         if isinstance(value, tuple):
             lengths = format_spec.endswith(" x") or all(isinstance(one, int) for one in value)
             return (" x " if lengths else ", ").join(format(one, format_spec.removesuffix(" x")) for one in value)
@@ -450,3 +444,7 @@ class _Words(Formatter):
         if isinstance(value, int) and len(format_spec) > 1 and format_spec.replace(" ", "").isalpha():
             return counted(value, format_spec)
         return format(MODELS.get(value, value), format_spec)
+
+
+def _filled(words: str, finding: Finding) -> str:
+    return _Words().vformat(words, (), _figures(finding))
