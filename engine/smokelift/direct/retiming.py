@@ -103,7 +103,7 @@ def steady_part(sequence: Sequence, overlap: int | None = None) -> tuple[int, in
     profiles = [_profile(sequence.density(number)) for number in sequence.frames]
     parts: list[tuple[float, int, int]] = []
     for count in range(whole, shortest - 1, -1):
-        shared = default_overlap(count) if overlap is None else overlap
+        shared = default_overlap(count) if overlap is None else max(overlap, 1)
         for first in range(whole - count + 1):
             middle = first + shared // 2
             parts.append((_change(profiles[middle], profiles[middle + count - shared]), first, first + count - 1))

@@ -96,10 +96,3 @@ def test_a_loop_ends_where_it_begins(source, tmp_path):
     assert step(loop.density(6), loop.density(1)) < 2 * usual
     assert step(loop.density(3), loop.density(4)) < 2 * usual
     assert step(source.density(7), source.density(2)) > 2 * usual
-
-
-def test_loops_that_cannot_be_are_refused(source, tmp_path):
-    for first, last, overlap in ((0, 10, 3), (2, 11, 3), (2, 10, 0), (2, 10, 5), (4, 6, 1)):
-        with pytest.raises(ValueError):
-            list(loop_sequence(source, tmp_path / "out", first, last, overlap, npz=True))
-    assert not (tmp_path / "out").exists()
