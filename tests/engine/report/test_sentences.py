@@ -51,7 +51,8 @@ def test_every_finding_has_its_words_and_all_words_are_said() -> None:
     assert len(found) > 60
     assert [kind for kind in found if not any(re.fullmatch(kind, known) for known in WORDS)] == []
     written = {pattern for module in modules() for pattern in texts(module)} - {".+"}
-    filled_in = [re.compile(pattern) for pattern in written if ".+" in pattern]
+    # longer ones are messages of errors
+    filled_in = [re.compile(pattern) for pattern in written if ".+" in pattern and len(pattern) < 80]
     unsaid = [kind for kind in WORDS if re.escape(kind) not in written]
     assert [kind for kind in unsaid if not any(pattern.fullmatch(kind) for pattern in filled_in)] == []
 
