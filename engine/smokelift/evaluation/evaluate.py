@@ -63,9 +63,7 @@ def first_frame(sequence: Sequence) -> int:
     return 0 if clip is None else clip.first
 
 
-def open_views(
-    sequence: Sequence, paths: tuple[tuple[Path, Path], ...], stack: ExitStack, notes: list[str]
-) -> list[ReferenceView]:
+def open_views(sequence: Sequence, paths: list[list[Path]], stack: ExitStack, notes: list[str]) -> list[ReferenceView]:
     """Open the sequence's own input, and other cameras with their clips, by the paths of both.
 
     The stack closes the clips. The notes take a sentence if the input cannot be compared with. It raises ValueError if
@@ -115,46 +113,18 @@ def _view(
     return ReferenceView(name, camera, background, clip, first)
 
 
-@dataclass(frozen=True, eq=False)
-class Evaluation:
-    """What was found."""
-
-    figures: Figures
-    """Nested plain values, as JSON holds them; None where there is nothing to say."""
-    sequence: Sequence
-    truth: Truth | None
-    """What was evaluated, and the truth of its box, if it is known."""
-
-    def write_picture(self, path: Path) -> None:
-        """Write a late frame from all around, below the truth's where it is known, with its scores, as a PNG."""
-        sequence = self.sequence
-        number = sequence.frames[3 * (len(sequence.frames) - 1) // 4]
-        scores = self.figures["orbit"]
-        known = [name for name in LABEL_SCORES if scores[name] is not None]
-        shown = ", ".join(f"{name.replace('_', ' ')} {scores[name]:.3f}" for name in known)
-        rows = [
-            (f"frame {number}, beside the {scores['reference']}: {shown}", sequence.scene, sequence.density(number))
-        ]
-        if self.truth is not None:
-            true = _true_density(sequence, self.truth, number)
-            rows.insert(0, (f"truth, frame {number}", on_grid(sequence.scene, self.truth.shape), true))
-        labels = [said for said, _, _ in rows]
-        tiles = [
-            [eight_bit(Orbit(scene).image(density, degrees, TILE_ROWS)) for degrees in TILE_AZIMUTHS]
-            for _, scene, density in rows
-        ]
-        write_sheet(path, tiles, [f"{degrees}\N{DEGREE SIGN}" for degrees in TILE_AZIMUTHS], labels)
-
-
 def evaluate(
-    sequence: Sequence, truth_path: Path | None = None, view_paths: tuple[tuple[Path, Path], ...] = ()
-) -> Evaluation:
+    sequence: Sequence, truth_path: Path | None, view_paths: list[list[Path]], picture_path: Path | None
+) -> Figures:
     """Compare a sequence with the truth and with other views, and its orbit with the truth's or with its own front.
 
     The last needs neither truth nor view: what smoke looks like from another side is, in its texture, what its
     front looks like. The truth is a truth.npz over the same box and at the same rate; resolutions may differ. Views
     are camera files and clips, whose frame 0 is the input clip's. With any, or without a truth, the input is
-    compared as well. It is a ValueError if a file cannot be read or does not belong to the sequence.
+    compared as well. With the path of a picture, a late frame is drawn from all around.
+
+    What is found are nested plain values, as JSON holds them; None where there is nothing to say. It is a ValueError if
+    a file cannot be read or does not belong to the sequence.
     """
     if not sequence.frames:
         raise ValueError(f"{sequence.directory}: there are no finished frames to evaluate yet.")
@@ -176,7 +146,26 @@ def evaluate(
         if view_paths or truth is None:
             figures["views"] = [_against_view(whole, view) for view in views]
     figures["orbit"] = _orbit_figures(sequence, truth)
-    return Evaluation(figures, sequence, truth)
+    if picture_path is not None:
+        _write_picture(picture_path, sequence, truth, figures["orbit"])
+    return figures
+
+
+def _write_picture(path: Path, sequence: Sequence, truth: Truth | None, scores: Figures) -> None:
+    """Write a late frame from all around, below the truth's where it is known, with its scores, as a PNG."""
+    number = sequence.frames[3 * (len(sequence.frames) - 1) // 4]
+    known = [name for name in LABEL_SCORES if scores[name] is not None]
+    shown = ", ".join(f"{name.replace('_', ' ')} {scores[name]:.3f}" for name in known)
+    rows = [(f"frame {number}, beside the {scores['reference']}: {shown}", sequence.scene, sequence.density(number))]
+    if truth is not None:
+        true = _true_density(sequence, truth, number)
+        rows.insert(0, (f"truth, frame {number}", on_grid(sequence.scene, truth.shape), true))
+    tiles = [
+        [eight_bit(Orbit(scene).image(density, degrees, TILE_ROWS)) for degrees in TILE_AZIMUTHS]
+        for _, scene, density in rows
+    ]
+    titles = [f"{degrees}\N{DEGREE SIGN}" for degrees in TILE_AZIMUTHS]
+    write_sheet(path, tiles, titles, [label for label, _, _ in rows])
 
 
 def _orbit_figures(sequence: Sequence, truth: Truth | None) -> Figures:

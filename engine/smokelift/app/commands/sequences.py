@@ -113,14 +113,12 @@ def compare(options: argparse.Namespace, say: Reporter) -> None:
         )
     sequence = Sequence.open(options.directory)
     device.start(options.device)
-    found = evaluate(sequence, options.truth, tuple((camera, clip) for camera, clip in options.view))
-    text = json.dumps(found.figures, indent=1, allow_nan=False)
-    if options.picture is not None:
-        found.write_picture(options.picture)
+    figures = evaluate(sequence, options.truth, options.view, options.picture)
+    text = json.dumps(figures, indent=1, allow_nan=False)
     if options.json is not None:
         write_text(options.json, text + "\n")
         text = f"{options.json} written."
-    say.finish(text, found.figures)
+    say.finish(text, figures)
 
 
 def add_render_options(parser: argparse.ArgumentParser) -> None:
