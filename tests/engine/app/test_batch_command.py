@@ -33,6 +33,7 @@ npz = true
 input = "{shot.as_posix()}"
 name = "plume"
 frames = [0, 1]
+detail = 0
 """
     )
     return path
