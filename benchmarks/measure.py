@@ -6,7 +6,7 @@ import numpy as np
 
 from benchmarks.baked import BLACK, FRONT, Volumes
 from smokelift import Camera, Clip, Reconstruction, Scene, Settings, prepare_shot
-from smokelift.evaluation.frame_means import finite_mean, means, picture_figures
+from smokelift.evaluation.truth import finite_mean, means, picture_figures
 from smokelift.pipeline import Frame, compose
 from smokelift.render import Image, Volume, scene_renderer
 from smokelift.scene import CompleteScene, completed

@@ -17,9 +17,8 @@ from benchmarks.baked import FRONT, Baked
 from benchmarks.extraction.compose import Composed
 from benchmarks.extraction.score import score_element, seen_element
 from smokelift import Clip, Frame, Scene, Settings, metrics, reconstruct
-from smokelift.evaluation.frame_means import finite_mean, volume_means
-from smokelift.evaluation.orbit_scores import orbit_scores
-from smokelift.evaluation.truth import Truth, resampled
+from smokelift.evaluation.orbit import orbit_scores
+from smokelift.evaluation.truth import Truth, finite_mean, resampled, volume_means
 from smokelift.extraction.given_background import background_picture
 from smokelift.render import device
 from smokelift.scene import CompleteScene

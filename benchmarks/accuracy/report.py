@@ -10,7 +10,7 @@ import numpy as np
 from benchmarks import tables
 from benchmarks.accuracy.scenes import KnownScene
 from benchmarks.accuracy.score import images
-from smokelift.evaluation.orbit_scores import SHAPES
+from smokelift.evaluation.orbit import SHAPES
 from smokelift.footage.images import area_average
 from smokelift.output.images import eight_bit, write_sheet
 

@@ -18,9 +18,17 @@ from benchmarks.baked import BLACK
 from benchmarks.process import apart
 from smokelift import Scene
 from smokelift.evaluation import metrics
-from smokelift.evaluation.frame_means import eight_bit_values, finite_mean, means, picture_figures, volume_means
-from smokelift.evaluation.orbit_scores import SHAPES, orbit_scores
-from smokelift.evaluation.truth import Truth, on_grid, resampled
+from smokelift.evaluation.orbit import SHAPES, orbit_scores
+from smokelift.evaluation.truth import (
+    Truth,
+    eight_bit_values,
+    finite_mean,
+    means,
+    on_grid,
+    picture_figures,
+    resampled,
+    volume_means,
+)
 from smokelift.render import Image, scene_renderer
 from smokelift.scene import CompleteScene, completed
 from smokelift.transport import Array

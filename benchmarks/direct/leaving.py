@@ -16,8 +16,8 @@ import numpy.typing as npt
 
 from benchmarks.tables import markdown
 from smokelift.direct.continuation import DISSOLVED, ROOM, Continuation, continue_sequence
-from smokelift.direct.looping import default_overlap, loop_sequence, steady_part
-from smokelift.direct.new_sequence import open_source
+from smokelift.direct.retiming import default_overlap, loop_sequence, steady_part
+from smokelift.direct.state import open_source
 from smokelift.direct.surroundings import Ball, Fan
 from smokelift.evaluation.orbit import Orbit
 from smokelift.output.images import eight_bit, write_sheet

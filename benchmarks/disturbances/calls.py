@@ -11,9 +11,8 @@ from benchmarks.filming import filmed
 from benchmarks.measure import Figures, view_figures
 from smokelift.baselines.paper_method import PaperVelocity
 from smokelift.density import ViewSet
-from smokelift.evaluation.frame_means import SMOKE_FRACTION
 from smokelift.evaluation.metrics import velocity_error
-from smokelift.evaluation.truth import resampled
+from smokelift.evaluation.truth import SMOKE_FRACTION, resampled
 from smokelift.pipeline import Method, compose
 from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.settings import MethodName

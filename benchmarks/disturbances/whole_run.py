@@ -11,9 +11,8 @@ from benchmarks.filming import filmed
 from benchmarks.measure import Figures, reconstructed, view_figures
 from smokelift import Settings
 from smokelift.checks import Array
-from smokelift.evaluation.frame_means import SMOKE_FRACTION, finite_mean
 from smokelift.evaluation.metrics import velocity_error, volume_error
-from smokelift.evaluation.truth import resampled
+from smokelift.evaluation.truth import SMOKE_FRACTION, finite_mean, resampled
 from smokelift.pipeline import Frame
 from smokelift.render import Image
 from smokelift.scene import CompleteScene

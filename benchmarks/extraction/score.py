@@ -9,7 +9,7 @@ from scipy import ndimage
 from benchmarks.baked import BLACK, FRONT, Baked
 from benchmarks.extraction.compose import Composed
 from benchmarks.measure import Figures, optical_mass, view_figures
-from smokelift.evaluation.frame_means import finite_mean
+from smokelift.evaluation.truth import finite_mean
 from smokelift.footage.images import Picture
 from smokelift.render import Volume, scene_renderer
 from smokelift.scene import CompleteScene

@@ -15,8 +15,7 @@ from benchmarks.stability.environments import Environment
 from benchmarks.stability.forked import Ended, files_of, nothing, run, verdict
 from benchmarks.stability.shot import TinyShot
 from smokelift.app.cli import main
-from smokelift.output.files import INDEX
-from smokelift.output.index import SequenceError
+from smokelift.output.index import INDEX, SequenceError
 from smokelift.output.sequence import Sequence
 from smokelift_command.exits import CANCELLED, Termination
 

@@ -118,3 +118,9 @@ def two_views(plume, tmp_path_factory) -> Scene:
 def draft() -> Settings:
     """Settings that are quick."""
     return Settings.preset("draft")
+
+
+@pytest.fixture(scope="session")
+def smooth(draft) -> Settings:
+    """Settings that are quicker, for what does not ask for detail: making it up takes as long as ten frames."""
+    return replace(draft, detail=0.0)

@@ -19,11 +19,9 @@ from smokelift import Background, Camera, Clip, ClipSource, DirectionalLight, Do
 from smokelift.evaluation.truth import Truth, TruthError
 from smokelift.footage.frame_source import ClipError
 from smokelift.footage.image_files import ImageError, read_image
-from smokelift.output.archive import VELOCITY, read_arrays, write_arrays
-from smokelift.output.files import INDEX
+from smokelift.output.archive import VELOCITY, ResumeState, read_arrays, write_arrays
 from smokelift.output.images import write_image
-from smokelift.output.index import Index, SequenceError
-from smokelift.output.resume import ResumeState
+from smokelift.output.index import INDEX, Index, SequenceError
 from smokelift.render.environment import EnvironmentCells
 from smokelift.scene import EnvironmentLight, Inlet, Medium, Scene, SceneError, View, scene_to_dict
 from smokelift.transport import face_shapes

@@ -9,19 +9,18 @@ import io
 import os
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
 from smokelift._core import set_threads
-from smokelift.app.commands import COMMANDS
-from smokelift.app.options import add_device, whole_number
-from smokelift.app.progress import OutputError, reporter
+from smokelift.app.commands import batch, clips, directed, doctor, sequences
+from smokelift.app.options import add_device, add_sequence, whole_number
+from smokelift.app.progress import JsonReporter, OutputError, Reporter
 from smokelift.checks import printable
 from smokelift.footage.image_files import READABLE
-from smokelift.output.files import DISK_FULL
-from smokelift.output.index import DirectoryBusyError
-from smokelift.output.vdb import VdbUnavailable
+from smokelift.output.index import DISK_FULL, DirectoryBusyError
+from smokelift.output.vdb import PROXY_TIMES, VdbUnavailable
 from smokelift.render import DeviceError
 from smokelift_command.exits import BAD_INPUT, CANCELLED, DONE, NO_DEVICE, Termination
 
@@ -34,6 +33,44 @@ _TRANSIENT = {
 
 MAX_THREADS = 1024
 """Largest number of threads: more than any processor has."""
+
+COMMANDS: Mapping[str, tuple[Callable[..., None], Callable[..., None], str]] = {
+    "reconstruct": (clips.reconstruct, clips.add_reconstruct_options, "turn a clip or scene file into a VDB sequence"),
+    "extract": (
+        clips.extract,
+        clips.add_extract_options,
+        "separate smoke from what is behind it, as pictures with alpha",
+    ),
+    "batch": (batch.run, batch.add_options, "reconstruct a list of shots, as many at a time as memory allows"),
+    "inspect": (
+        clips.inspect,
+        clips.add_inspect_options,
+        "say what a run would assume, choose and cost, without running it",
+    ),
+    "render": (sequences.render, sequences.add_render_options, "make an image or video of a sequence"),
+    "check": (sequences.check, add_sequence, "check that a sequence is complete and undamaged"),
+    "preview": (
+        sequences.preview,
+        sequences.add_preview_options,
+        "make pictures and a video that show the smoke from all sides",
+    ),
+    "proxy": (sequences.proxy, add_sequence, f"write copies for viewports, with voxels {PROXY_TIMES} times as large"),
+    "evaluate": (
+        sequences.compare,
+        sequences.add_evaluate_options,
+        "compare the smoke with its front, known volumes and other cameras",
+    ),
+    "continue": (
+        directed.continue_,
+        directed.add_continue_options,
+        "make what the smoke does after its clip, or in wind",
+    ),
+    "retime": (directed.retime, directed.add_retime_options, "make slow motion, fast motion and ramps of a sequence"),
+    "loop": (directed.loop, directed.add_loop_options, "make a part of a sequence repeat without a seam"),
+    "export": (sequences.export, sequences.add_export_options, "write small OpenVDB files, a proxy and a USD file"),
+    "doctor": (doctor.run, lambda _parser: None, "list versions, devices and what is missing"),
+}
+"""What runs a command and says what happens, what adds its options, and what it is for, by its name."""
 
 _HINT = " Finished frames stay; --resume goes on from them."
 
@@ -86,7 +123,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(options: argparse.Namespace, hint: str) -> int:
-    say = reporter(options.progress)
+    say = JsonReporter() if options.progress == "json" else Reporter()
     set_threads(options.threads)
     try:
         try:
@@ -153,10 +190,10 @@ def command_parser() -> argparse.ArgumentParser:
     common.add_argument(
         "--threads", type=whole_number(0, MAX_THREADS), default=0, metavar="N", help="threads at most; 0 (default): all"
     )
-    for name, command in COMMANDS.items():
-        of_command = commands.add_parser(name, parents=[common], help=command.help)
-        command.add_options(of_command)
-        of_command.set_defaults(run=command.run)
+    for name, (run, add_options, help_text) in COMMANDS.items():
+        of_command = commands.add_parser(name, parents=[common], help=help_text)
+        add_options(of_command)
+        of_command.set_defaults(run=run)
     return parser
 
 

@@ -9,7 +9,8 @@ from collections import deque
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Literal, Self, TypeVar
+from statistics import fmean
+from typing import Any, Self, TypeVar
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
@@ -17,9 +18,8 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from smokelift.checks import Figures, Finding, printable
 from smokelift.output.index import median_psnr, work_seconds
 from smokelift.output.sequence import Sequence
-from smokelift.report.views import message
+from smokelift.report.sentences import message
 
-Style = Literal["text", "json"]
 Made = TypeVar("Made")
 Shown = Callable[[], Mapping[str, Any]]
 
@@ -58,40 +58,116 @@ def _output() -> Iterator[None]:
 
 
 class Reporter:
-    """Receives what happens; a context manager around the frames."""
+    """Says what happens to people; a context manager around the frames, whose bar ends with it."""
+
+    def __init__(self) -> None:
+        self._console = _Console(highlight=False)
+        self._errors = _Console(stderr=True, highlight=False)
+        self._bar = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TimeRemainingColumn(),
+            TextColumn("{task.fields[fit]}"),
+            console=self._console,
+            speed_estimate_period=120,
+        )
+        self._shown: list[Mapping[str, Any]] = []
+        self._task = self._bar.add_task("frames", start=False, fit="")
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *error: object) -> None:
-        self.stop()
-
-    def stop(self) -> None:
-        """The frames' bar ends."""
-        return
+        with _output():
+            if self._bar.live.is_started:  # else the bar would leave an empty line
+                self._bar.stop()
 
     def note(self, said: Finding | str) -> None:
-        """Something that was assumed or noticed."""
+        """Say something that was assumed or noticed."""
+        with _output():
+            self._console.print(printable_lines(_fields(said)["text"]), markup=False, soft_wrap=True)
 
     def start(self, total: int, done: int, seconds: float | None = None, shown: Shown = dict) -> None:
-        """Frames begin: ``total`` of them, ``done`` already.
+        """Say that frames begin: ``total`` of them, ``done`` already.
 
         ``seconds`` is a forecast of the rest, if there is one; ``shown`` gives what else a program shows of the shot.
         """
+        with _output():
+            self._bar.update(self._task, total=total, completed=done)
+            self._bar.start_task(self._task)
+            self._bar.start()
 
     def frame(self, number: int, figures: Mapping[str, Any]) -> None:
-        """One more frame is finished."""
+        """Say that one more frame is finished."""
+        fit = figures.get("origin", "no smoke")
+        if "psnr" in figures:  # the last fit stays on the screen, so it is the median of the run
+            self._shown.append(figures)
+            fit = f"fit {median_psnr(self._shown):.1f} dB"
+        with _output():
+            self._bar.update(self._task, advance=1, fit=fit)
 
     def finish(self, said: Finding | str, details: Mapping[str, Any]) -> None:
-        """The job is done."""
+        """Say that the job is done; the details are for programs."""
+        self.__exit__()
+        self.note(said)
 
     def fail(self, text: str, status: int, retryable: bool = False) -> None:
-        """The job failed; ``retryable`` if the same command may succeed later."""
+        """Say that the job failed; ``retryable`` if the same command may succeed later."""
+        self.__exit__()
+        self._errors.print(printable(text), markup=False, soft_wrap=True)
 
 
-def reporter(style: Style) -> Reporter:
-    """The reporter of a style."""
-    return _Json() if style == "json" else _Text()
+class JsonReporter(Reporter):
+    """Events ``note``, ``start``, ``frame``, ``done`` and ``error`` for programs, one per line.
+
+    What is said has its ``text``; a finding has its ``kind`` and ``figures`` too. A note says if it is a ``doubt``.
+    """
+
+    def __init__(self) -> None:
+        self._total = self._done = 0
+        self._seconds: deque[float] = deque(maxlen=FORECAST_FRAMES)
+        self._before = time.monotonic()
+
+    def __exit__(self, *error: object) -> None:
+        """There is no bar."""
+
+    def note(self, said: Finding | str) -> None:
+        self._say("note", **_fields(said), doubt=isinstance(said, Finding) and said.doubt)
+
+    def start(self, total: int, done: int, seconds: float | None = None, shown: Shown = dict) -> None:
+        self._total, self._done = total, done
+        known = {}
+        if seconds is not None and total > done:
+            self._seconds.append(seconds / (total - done))
+            known = {"seconds_left": round(seconds, 1)}
+        self._say("start", total=total, done=done, **known, **shown())
+        self._before = time.monotonic()
+
+    def frame(self, number: int, figures: Mapping[str, Any]) -> None:
+        self._done += 1
+        now = time.monotonic()
+        # all that passed, with the files; of a first frame that was under way at the start, what it says itself
+        self._seconds.append(max(now - self._before, work_seconds(figures)))
+        self._before = now
+        left = round((self._total - self._done) * fmean(self._seconds), 1)
+        done, total = self._done, self._total
+        self._say("frame", frame=number, done=done, total=total, seconds_left=left, figures=dict(figures))
+
+    def finish(self, said: Finding | str, details: Mapping[str, Any]) -> None:
+        self._say("done", **_fields(said), **details)
+
+    def fail(self, text: str, status: int, retryable: bool = False) -> None:
+        self._say("error", text=text, status=status, later=retryable)
+
+    def _say(self, event: str, **fields: Any) -> None:
+        with _output():
+            # in one piece, since shots of a batch speak side by side
+            print(json.dumps({"event": event, **fields}) + "\n", end="", flush=True)
+
+
+def _fields(said: Finding | str) -> dict[str, Any]:
+    return {"text": said} if isinstance(said, str) else message(said)
 
 
 def say_sequence(
@@ -135,106 +211,3 @@ def say_frames(say: Reporter, made: Iterable[tuple[int, Made]], total: int, orig
 def seconds_before(sequence: Sequence, new: Collection[int]) -> float:
     """Return what the frames of a sequence took that a run found finished; ``new`` are the numbers of its own."""
     return sum(work_seconds(sequence.figures(number)) for number in sequence.frames if number not in new)
-
-
-def _fields(said: Finding | str) -> dict[str, Any]:
-    return {"text": said} if isinstance(said, str) else message(said)
-
-
-class _Text(Reporter):
-    def __init__(self) -> None:
-        self._console = _Console(highlight=False)
-        self._errors = _Console(stderr=True, highlight=False)
-        self._bar = Progress(
-            TextColumn("{task.description}"),
-            BarColumn(),
-            MofNCompleteColumn(),
-            TimeRemainingColumn(),
-            TextColumn("{task.fields[fit]}"),
-            console=self._console,
-            speed_estimate_period=120,
-        )
-        self._shown: list[Mapping[str, Any]] = []
-        self._task = self._bar.add_task("frames", start=False, fit="")
-
-    def stop(self) -> None:
-        with _output():
-            if self._bar.live.is_started:  # else the bar would leave an empty line
-                self._bar.stop()
-
-    def note(self, said: Finding | str) -> None:
-        with _output():
-            self._console.print(printable_lines(_fields(said)["text"]), markup=False, soft_wrap=True)
-
-    def start(self, total: int, done: int, seconds: float | None = None, shown: Shown = dict) -> None:
-        with _output():
-            self._bar.update(self._task, total=total, completed=done)
-            self._bar.start_task(self._task)
-            self._bar.start()
-
-    def frame(self, number: int, figures: Mapping[str, Any]) -> None:
-        fit = figures.get("origin", "no smoke")
-        if "psnr" in figures:  # the last fit stays on the screen, so it is the median of the run
-            self._shown.append(figures)
-            fit = f"fit {median_psnr(self._shown):.1f} dB"
-        with _output():
-            self._bar.update(self._task, advance=1, fit=fit)
-
-    def finish(self, said: Finding | str, details: Mapping[str, Any]) -> None:
-        self.stop()
-        self.note(said)
-
-    def fail(self, text: str, status: int, retryable: bool = False) -> None:
-        self.stop()
-        self._errors.print(printable(text), markup=False, soft_wrap=True)
-
-
-class _Json(Reporter):
-    """Events ``note``, ``start``, ``frame``, ``done`` and ``error``, one per line.
-
-    What is said has its ``text``; a finding has its ``kind`` and ``figures`` too. A note says if it is a ``doubt``.
-    """
-
-    def __init__(self) -> None:
-        self._total = self._done = 0
-        self._seconds: deque[float] = deque(maxlen=FORECAST_FRAMES)
-        self._before = time.monotonic()
-
-    def note(self, said: Finding | str) -> None:
-        self._say("note", **_fields(said), doubt=isinstance(said, Finding) and said.doubt)
-
-    def start(self, total: int, done: int, seconds: float | None = None, shown: Shown = dict) -> None:
-        self._total, self._done = total, done
-        known = {}
-        if seconds is not None and total > done:
-            self._seconds.append(seconds / (total - done))
-            known = {"seconds_left": round(seconds, 1)}
-        self._say("start", total=total, done=done, **known, **shown())
-        self._before = time.monotonic()
-
-    def frame(self, number: int, figures: Mapping[str, Any]) -> None:
-        self._done += 1
-        now = time.monotonic()
-        # all that passed, with the files; of a first frame that was under way at the start, what it says itself
-        self._seconds.append(max(now - self._before, work_seconds(figures)))
-        self._before = now
-        left = (self._total - self._done) * sum(self._seconds) / len(self._seconds)
-        self._say(
-            "frame",
-            frame=number,
-            done=self._done,
-            total=self._total,
-            seconds_left=round(left, 1),
-            figures=dict(figures),
-        )
-
-    def finish(self, said: Finding | str, details: Mapping[str, Any]) -> None:
-        self._say("done", **_fields(said), **details)
-
-    def fail(self, text: str, status: int, retryable: bool = False) -> None:
-        self._say("error", text=text, status=status, later=retryable)
-
-    def _say(self, event: str, **fields: Any) -> None:
-        with _output():
-            # in one piece, since shots of a batch speak side by side
-            print(json.dumps({"event": event, **fields}) + "\n", end="", flush=True)

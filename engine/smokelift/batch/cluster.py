@@ -15,8 +15,8 @@ from typing import Any
 
 import distributed
 
-from smokelift.batch.shots import BatchShot
-from smokelift.batch.work import Record, ShotMemory, Task, read_record
+from smokelift.batch.shots import BatchShot, Record, read_record
+from smokelift.batch.work import ShotMemory, Task
 
 CONNECT_SECONDS, RETURN_SECONDS = 30, 1800
 """Seconds for the scheduler to answer, and to return if it goes away."""

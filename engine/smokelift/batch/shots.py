@@ -1,12 +1,16 @@
-"""The list of a batch, ``shots.toml``, as ``docs/batch.md`` describes it."""
+"""What is known of a batch: its list, ``shots.toml`` (see ``docs/batch.md``), and the record of each shot."""
 
 import argparse
+import json
 import re
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from smokelift.checks import shown
+from smokelift.checks.whole_files import write_text
+from smokelift.output.index import Index, SequenceError
 from smokelift.scene.scene_file import Place, TomlFile, read_toml
 
 OPTIONS = (
@@ -17,6 +21,10 @@ OPTIONS = (
 
 _NAME = re.compile(r"[^\W.][^\\/:*?\"<>|\x00-\x1f]*")
 """Names that every file system takes and that are no hidden files."""
+
+Status = Literal["waiting", "running", "done", "refused", "crashed", "stuck", "cancelled"]
+"""``running``: or its machine was lost while it ran; ``refused``: the engine says what is wrong; ``stuck``: what passes
+(a full disk, say) did not pass in time."""
 
 
 @dataclass(frozen=True)
@@ -79,7 +87,6 @@ def read_shots(path: Path, parser: argparse.ArgumentParser) -> tuple[BatchShot, 
 
 
 def _words(file: TomlFile, place: Place, key: str, value: Any) -> list[str]:
-    """The words of the command line that say an option."""
     if key == "npz" and isinstance(value, bool):
         return ["--npz"] * value
     if key == "mask":
@@ -96,3 +103,53 @@ def _text(file: TomlFile, place: Place, key: str, value: Any) -> str:
     if not isinstance(value, str) or not value:
         raise file.error(place, f"{key} must be a text, not {shown(value)}", key)
     return value
+
+
+@dataclass(frozen=True)
+class Record:
+    """What is known of a shot besides its sequence.
+
+    That is its options and the size and time of change of its input and mask (``of``); how its last run ended, what
+    the engine said then, assumed and noticed; how often it was run; the seconds of all runs and the bytes at the peak.
+    ``forecast`` has the ``frames``, ``seconds`` and ``memory`` (bytes) that ``smokelift inspect`` foretells.
+    """
+
+    of: dict[str, Any]
+    status: Status = "waiting"
+    sentence: str = ""
+    notes: list[str] = field(default_factory=list)
+    runs: int = 0
+    seconds: float = 0.0
+    memory: int = 0
+    forecast: dict[str, Any] | None = None
+
+    def write(self, shot: BatchShot) -> None:
+        """Write the file; OSError if that fails."""
+        write_text(shot.file("json"), json.dumps(asdict(self), indent=1) + "\n")
+
+
+def read_record(shot: BatchShot) -> Record:
+    """Return the record of a shot as it is now listed; a new one if its options, input or mask have changed."""
+    of: dict[str, Any] = {"options": list(shot.options), "files": []}
+    masks = [word.removeprefix("--mask=") for word in shot.options if word.startswith("--mask=")]
+    for path in (shot.input, *map(Path, masks)):
+        with suppress(OSError):  # a pattern of pictures is no file; the engine says if there are none
+            of["files"].append([path.stat().st_size, path.stat().st_mtime_ns])
+    with suppress(OSError, ValueError, TypeError):  # a damaged record is none
+        record = Record(**json.loads(shot.file("json").read_text(encoding="utf-8")))
+        if record.of == of:
+            return record
+    return Record(of)
+
+
+def read_index(shot: BatchShot) -> Index:
+    """Return what the sequence of a shot says of its finished frames; of none if there is no sequence."""
+    try:
+        return Index.read(shot.directory)
+    except SequenceError:
+        return Index({}, {})
+
+
+def is_finished(shot: BatchShot, record: Record) -> bool:
+    """Return whether a shot need not be run again."""
+    return record.status == "done" and read_index(shot).complete

@@ -13,16 +13,13 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import suppress
-from dataclasses import asdict, dataclass, field, replace
-from pathlib import Path
-from typing import Any, Literal
+from dataclasses import replace
+from typing import Any
 
 import psutil
 
-from smokelift.batch.shots import BatchShot
-from smokelift.checks.whole_files import write_text
-from smokelift.output.files import Lock
-from smokelift.output.index import Index, SequenceError
+from smokelift.batch.shots import BatchShot, Record, Status, is_finished, read_index, read_record
+from smokelift.output.index import Lock
 from smokelift_command.exits import BAD_INPUT, CANCELLED, DONE, NO_DEVICE
 
 ENGINE = (sys.executable, "-m", "smokelift_command.tethered")
@@ -38,34 +35,7 @@ PAUSE_SECONDS = 30.0
 RETRIES = {"crashed": 2, "stuck": 120}
 """New tries, by how the last one ended; while it is stuck, those of an hour without a new frame."""
 
-Status = Literal["waiting", "running", "done", "refused", "crashed", "stuck", "cancelled"]
-"""``running``: or its machine was lost while it ran; ``refused``: the engine says what is wrong; ``stuck``: what passes
-(a full disk, say) did not pass in time."""
-
 _STATUS: dict[int, Status] = {DONE: "done", CANCELLED: "cancelled", BAD_INPUT: "refused", NO_DEVICE: "refused"}
-
-
-@dataclass(frozen=True)
-class Record:
-    """What is known of a shot besides its sequence.
-
-    That is its options and the size and time of change of its input and mask (``of``); how its last run ended, what
-    the engine said then, assumed and noticed; how often it was run; the seconds of all runs and the bytes at the peak.
-    ``forecast`` has the ``frames``, ``seconds`` and ``memory`` (bytes) that ``smokelift inspect`` foretells.
-    """
-
-    of: dict[str, Any]
-    status: Status = "waiting"
-    sentence: str = ""
-    notes: list[str] = field(default_factory=list)
-    runs: int = 0
-    seconds: float = 0.0
-    memory: int = 0
-    forecast: dict[str, Any] | None = None
-
-    def write(self, shot: BatchShot) -> None:
-        """Write the file; OSError if that fails."""
-        write_text(shot.file("json"), json.dumps(asdict(self), indent=1) + "\n")
 
 
 Task = Callable[[BatchShot, threading.Event], Record]
@@ -73,33 +43,6 @@ Task = Callable[[BatchShot, threading.Event], Record]
 
 ShotMemory = Mapping[BatchShot, int]
 """Bytes of memory that each shot needs, in the order in which they begin; 0 if that is not known."""
-
-
-def read_record(shot: BatchShot) -> Record:
-    """Return the record of a shot as it is now listed; a new one if its options, input or mask have changed."""
-    of: dict[str, Any] = {"options": list(shot.options), "files": []}
-    masks = [word.removeprefix("--mask=") for word in shot.options if word.startswith("--mask=")]
-    for path in (shot.input, *map(Path, masks)):
-        with suppress(OSError):  # a pattern of pictures is no file; the engine says if there are none
-            of["files"].append([path.stat().st_size, path.stat().st_mtime_ns])
-    with suppress(OSError, ValueError, TypeError):  # a damaged record is none
-        record = Record(**json.loads(shot.file("json").read_text(encoding="utf-8")))
-        if record.of == of:
-            return record
-    return Record(of)
-
-
-def read_index(shot: BatchShot) -> Index:
-    """Return what the sequence of a shot says of its finished frames; of none if there is no sequence."""
-    try:
-        return Index.read(shot.directory)
-    except SequenceError:
-        return Index({}, {})
-
-
-def is_finished(shot: BatchShot, record: Record) -> bool:
-    """Return whether a shot need not be run again."""
-    return record.status == "done" and read_index(shot).complete
 
 
 def inspect_shot(shot: BatchShot, stop: threading.Event, engine: Sequence[str] = ENGINE) -> Record:

@@ -1,16 +1,22 @@
-"""A simulation fitted to a clip's last frames: its forces, its inlets, and a velocity that these forces explain.
+"""A simulation fitted to a clip's last frames: its inlets, its forces, and a velocity that these forces explain.
 
 An estimated velocity is smooth and slow: it explains how the smoke moved, but lacks the eddies that draw it out next. A
 simulation that starts from it makes threads. So the simulation runs along the clip first. It takes the velocity from
 the first frame alone, and at each frame the clip's density (direct insertion: Charney, Halem and Jastrow, "Use of
 incomplete historical data to infer the present state of the atmosphere", 1969). The density's detail turns the air
 around it, so that eddies come in on every scale that the clip shows. Small ones that are still missing are made up
-(`smokelift.direct.turbulence`).
+(`smokelift.direct.simulation.with_small_eddies`).
 
 The buoyancy is the one whose velocity moves the smoke up as the clip does: each frame is carried on for a step, and
 compared with the next one in the picture. What rises there is the pattern of the smoke, not its center of mass, which
 sinks where a head dissolves while the base is fed. A velocity's change from one frame to the next does not show the
 buoyancy, since estimates err by more than that (docs/experiments/continuation.md).
+
+Where a velocity is wrong, the change that it leaves unexplained has both signs side by side, because smoke is moved and
+not made. Where smoke enters, the change is positive all over. So an inlet shows in the mean of the residual over a few
+voxels, beside the mean of its magnitude: their ratio, the coherence, is near one in an inlet and near zero elsewhere.
+An inlet also stands out from what is left unexplained in the rest of the smoke, and from other inlets. The front of
+smoke that is faster than the velocity looks like a wide, weak one.
 """
 
 import math
@@ -22,13 +28,13 @@ from itertools import pairwise
 import numpy as np
 from scipy import ndimage
 
+import smokelift._core as _core
 from smokelift.checks import Mask
-from smokelift.direct.inflow import Inflow, find_inflow
-from smokelift.direct.simulation import Combustion, Physics, Simulation
+from smokelift.direct.simulation import Combustion, Inflow, Physics, Simulation, small_eddy_speed, with_small_eddies
 from smokelift.direct.state import SmokeState
 from smokelift.direct.surroundings import Surroundings
-from smokelift.direct.turbulence import small_eddy_speed, with_small_eddies
 from smokelift.transport import Array, Velocity, advect, at_centres, project
+from smokelift.velocity.linearization import SMOKE_THRESHOLD
 from smokelift.velocity.pyramid import coarsen_density, coarsen_velocity
 
 COARSE_SIDE_VOXELS = 64
@@ -66,6 +72,34 @@ RISE_ROUNDING = 1e-9
 
 PRECISION = 0.01
 """Relative change of the buoyancy below which it is found."""
+
+BLUR_VOXELS = 2.0
+"""Standard deviation, in voxels, of the Gaussian that takes the means. Wider ones miss small inlets
+(docs/experiments/velocity-solver.md)."""
+
+COHERENCE = (0.4, 0.6)
+"""Mean residual over mean magnitude: nothing is an inlet below the first, everything that stands out is one above the
+second."""
+
+STRENGTH = (3.0, 6.0)
+"""Mean residual in medians of its magnitude over the smoke, likewise."""
+
+PROMINENCE = (0.1, 0.2)
+"""Mean residual over that of the strongest inlet, likewise: inlets of one scene are of one kind
+(docs/experiments/velocity-solver.md)."""
+
+MIN_SCORE = 0.5
+"""Score above which a voxel is in an inlet."""
+
+MIN_LASTING_FRACTION = 0.25
+"""Smoke that lasts in an inlet over that of the strongest, at least, where the weaker half of the frames counts: what a
+wrong velocity leaves is scattered and moves on."""
+
+MIN_RESIDUAL_FRACTION = np.float32(1e-4)
+"""Fraction of the largest density below which a residual means nothing."""
+
+MARGIN_VOXELS = 1
+"""Voxels around an inlet that belong to it: its smoke is taken from the clip until it is outside."""
 
 
 def fit_simulation(
@@ -250,3 +284,77 @@ def _dissipation(states: Sequence[SmokeState], dt: float, inlets: Mask) -> float
         found_mass += float(after.density.sum(dtype=np.float64, where=~inlets))
     lost = math.log(carried_mass / found_mass) / dt if carried_mass > 0 and found_mass > 0 else 0.0
     return max(0.0, lost)
+
+
+def find_inflow(states: Sequence[SmokeState], dt: float, marked: Mask | None = None) -> Inflow:
+    """Find the inlets of a clip from the states of its last frames, two at least, `dt` seconds apart.
+
+    Inlets that are known are marked (nx, ny, nz); otherwise they are found from what the velocities do not explain.
+    """
+    voxels = _detect_inlets(states, dt) if marked is None else marked
+    return Inflow(ndimage.binary_dilation(voxels, np.ones((3, 3, 3)), MARGIN_VOXELS), states)
+
+
+def _detect_inlets(states: Sequence[SmokeState], dt: float) -> Mask:
+    """The voxels of inlets by the mean over all frames, for inlets stand still and errors do not."""
+    changes = []
+    for before, after in pairwise(states):
+        carried = advect(before.density, after.velocity, dt)
+        largest = np.maximum(after.density, carried)
+        changes.append((after.density - carried) / max(largest.max(), np.float32(1e-30)))
+    entering = inlet_score(changes, largest > SMOKE_THRESHOLD * largest.max()) > MIN_SCORE
+    middle = len(states) // 2
+    lasting = np.minimum.reduce([_blurred_mean(part) for part in (changes[:middle], changes[middle:]) if part])
+    outflow = sum(map(_outflow, states[1:]), _outflow(states[0]))
+    return _strongest_inlets(entering, _blurred_mean(changes), lasting, outflow)
+
+
+def inlet_score(changes: Sequence[Array], smoke: Mask) -> Array:
+    """Return how surely smoke enters in each voxel (nx, ny, nz), from 0 to 1.
+
+    The changes, one at least, are what the velocity leaves unexplained of each step, in units of the largest density.
+    """
+    mean, magnitude = _blurred_mean(changes), _blurred_mean([np.abs(change) for change in changes])
+    typical = float(np.median(np.abs(mean[smoke]))) if smoke.any() else 0.0
+    if typical == 0.0:
+        return np.zeros(mean.shape, np.float32)
+    coherent = _ramp(mean / (magnitude + MIN_RESIDUAL_FRACTION), COHERENCE)
+    strong = _ramp(mean / np.float32(typical), STRENGTH)
+    prominent = _ramp(mean / max(np.max(coherent * mean), MIN_RESIDUAL_FRACTION), PROMINENCE)
+    return np.asarray(coherent * strong * prominent)
+
+
+def _blurred_mean(changes: Sequence[Array]) -> Array:
+    """The mean over steps and over a few voxels."""
+    return _core.blur(sum(changes[1:], changes[0]) / np.float32(len(changes)), BLUR_VOXELS, 3.0)
+
+
+def _ramp(values: Array, ends: tuple[float, float]) -> Array:
+    low, high = ends
+    return np.clip((values - np.float32(low)) / np.float32(high - low), 0, 1)
+
+
+def _outflow(state: SmokeState) -> Array:
+    """Smoke that flows from each voxel into others of the box, less what flows from there into it, times m/s."""
+    outflow = np.zeros_like(state.density)
+    for axis, component in enumerate(state.velocity.faces):
+        density, flow = np.moveaxis(state.density, axis, 0), np.moveaxis(component, axis, 0)[1:-1]
+        through = 0.5 * flow * (density[1:] + density[:-1])
+        along = np.moveaxis(outflow, axis, 0)
+        along[:-1] += through
+        along[1:] -= through
+    return outflow
+
+
+def _strongest_inlets(entering: Mask, strength: Array, lasting: Array, outflow: Array) -> Mask:
+    """The connected components of voxels (nx, ny, nz) in which most smoke enters all the time, and goes into the box.
+
+    Where smoke gathers before it leaves the box, more appears than velocities explain as well; it flows in from there.
+    """
+    labels, count = ndimage.label(entering)
+    if count == 0:
+        return entering
+    numbers = np.arange(1, count + 1)
+    entered, lasted, left = (ndimage.sum_labels(each, labels, numbers) for each in (strength, lasting, outflow))
+    entered = np.where(left > 0, entered, 0)
+    return np.asarray(np.isin(labels, numbers[(entered > 0) & (lasted >= MIN_LASTING_FRACTION * entered.max())]))

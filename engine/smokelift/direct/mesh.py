@@ -117,7 +117,6 @@ class Mesh:
 
 
 def _read_stl(path: Path) -> npt.NDArray[np.float32]:
-    """The triangles (n, 3, 3) of a file."""
     if not path.is_file():
         raise ValueError(f"{path}: is no file; give the path of a binary STL file.")
     try:

@@ -1,4 +1,8 @@
-"""What an artist places around the smoke: wind, turbulence, fans and obstacles, and what of it is solid at a step."""
+"""What an artist places around the smoke: wind, turbulence, fans and obstacles, and what of it is solid at a step.
+
+Turbulence is curl noise (Bridson et al. 2007), of random Fourier modes (Kraichnan 1970) in place of a lattice of noise:
+the curl of a wave is a wave that swings across its own direction. A sum of waves is known at any place, on any grid.
+"""
 
 import math
 from dataclasses import dataclass
@@ -7,16 +11,62 @@ from typing import NamedTuple
 
 import numpy as np
 
-from smokelift.checks import Mask
+from smokelift.checks import Doubles, Mask
 from smokelift.direct.mesh import Mesh
-from smokelift.direct.turbulence import Turbulence
 from smokelift.scene import Box, Domain
 from smokelift.scene.checks import Vector
 from smokelift.transport import Array, Faces, Velocity, divergence, outflow
 from smokelift.transport.pressure import FaceMasks, faces_between, faces_of, project_with_given_faces
 
+MODES = 64
+"""Waves in the sum: enough that it shows no pattern."""
+
+OCTAVES = 1.0
+"""Octaves over which the sizes of the waves are spread, about that asked for. The flow makes smaller eddies by
+itself."""
+
 RISE_SECONDS = 0.5
 """Seconds in which the air takes on most (1 - 1/e) of a wind that sets in: a gust, and not a blow."""
+
+
+@dataclass(frozen=True)
+class Turbulence:
+    """Eddies everywhere, which change in the time that air takes to cross them."""
+
+    speed: float
+    """Of the air in the eddies, in m/s, root mean square."""
+    size: float
+    """Across an eddy, in meters, above 0."""
+    seed: int = 0
+    """Another one makes other eddies, from 0."""
+
+    def velocity(self, like: Velocity, time: float, first: tuple[int, ...] = (0, 0, 0)) -> list[Array]:
+        """The velocity in m/s on the faces of a grid that begins at a voxel, at a time in seconds."""
+        numbers, across, phase, rate = self._modes
+        turned = self.speed * np.sqrt(2 / MODES) * np.exp(1j * (phase + rate * time))
+        faces = []
+        for axis, component in enumerate(like.faces):
+            places = (first[d] + np.arange(n) + (0.0 if d == axis else 0.5) for d, n in enumerate(component.shape))
+            x, y, z = (
+                np.exp(1j * np.outer(along, like.voxel_size * place))
+                for along, place in zip(numbers.T, places, strict=True)
+            )
+            layers = (across[:, axis] * turned)[:, None, None] * x[:, :, None] * y[:, None, :]
+            waves = np.tensordot(layers.astype(np.complex64), z.astype(np.complex64), axes=(0, 0))
+            faces.append(np.ascontiguousarray(waves.real))
+        return faces
+
+    @cached_property
+    def _modes(self) -> tuple[Doubles, Doubles, Doubles, Doubles]:
+        """Waves across cos(number . x + phase + rate t): numbers (MODES, 3) in 1/m, across (MODES, 3), phase, rate."""
+        random = np.random.default_rng(self.seed)
+        along, other = (random.standard_normal((MODES, 3)) for _ in range(2))
+        along /= np.linalg.norm(along, axis=1, keepdims=True)
+        across = np.cross(along, other)
+        across /= np.linalg.norm(across, axis=1, keepdims=True)
+        halves = 2 ** (OCTAVES * (random.random(MODES) - 0.5))  # a wave holds two eddies
+        numbers, phase = along * (np.pi / self.size * halves)[:, None], 2 * np.pi * random.random(MODES)
+        return numbers, across, phase, self.speed / self.size * random.standard_normal(MODES)
 
 
 @dataclass(frozen=True)
@@ -170,7 +220,6 @@ class Surroundings:
 
     @cached_property
     def _at_rest(self) -> Mask:
-        """The voxels of the obstacles that do not move."""
         assert self.domain is not None
         voxels: Mask = np.zeros(self.domain.shape, bool)
         for obstacle in self.obstacles:

@@ -2,21 +2,27 @@
 
 from collections.abc import Iterator
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from smokelift.checks import counted
-from smokelift.evaluation.frame_means import Figures, means, picture_figures, volume_means
-from smokelift.evaluation.orbit import Orbit
-from smokelift.evaluation.orbit_scores import orbit_scores
-from smokelift.evaluation.reference_view import ReferenceView, first_frame, open_views
-from smokelift.evaluation.truth import Truth, on_grid, resampled
+from smokelift.evaluation.orbit import Orbit, orbit_scores
+from smokelift.evaluation.truth import Figures, Truth, means, on_grid, picture_figures, resampled, volume_means
+from smokelift.extraction.given_background import background_picture, open_plates
+from smokelift.footage.clip import Clip
+from smokelift.footage.images import area_average, reduced_size
 from smokelift.output.images import eight_bit, write_sheet
-from smokelift.output.sequence import Sequence
-from smokelift.output.viewer import Viewer
-from smokelift.render import Volume
+from smokelift.output.sequence import Sequence, Viewer
+from smokelift.render import Image, Volume
+from smokelift.scene import Camera, Scene
+
+MAX_COMPARED_SIDE = 480
+"""Pixels of a compared picture at most: larger ones are averaged over areas. Finer than any usual grid."""
+
+INPUT = "input"
+"""Name of the view that the sequence was made from."""
 
 TILE_AZIMUTHS, TILE_ROWS = tuple(range(0, 180, 18)), 240
 """Azimuths of the pictures, in degrees, and their rows of pixels."""
@@ -26,45 +32,99 @@ LABEL_SCORES = ("patches", "patches_worst", "patches_own", "edges", "flicker")
 
 
 @dataclass(frozen=True, eq=False)
-class Evaluation:
-    """What was found."""
+class ReferenceView:
+    """A camera with the clip that its pictures are compared with."""
 
-    figures: Figures
-    """Nested plain values, as JSON holds them; None where there is nothing to say."""
-    sequence: Sequence
-    truth: Truth | None
-    """What was evaluated, and the truth of its box, if it is known."""
+    name: str
+    """To call it by."""
+    camera: Camera
+    """With as many pixels as the pictures are compared at; where it moves, from the sequence's first frame on."""
+    background: Image
+    """(rows, columns, 3) or (3,): linear radiance behind the smoke."""
+    clip: Clip
+    """Its footage."""
+    first: int
+    """The clip's frame that the sequence's frame 1 belongs to."""
 
-    def write_picture(self, path: Path) -> None:
-        """Write a late frame from all around, below the truth's where it is known, with its scores, as a PNG."""
-        sequence = self.sequence
-        number = sequence.frames[3 * (len(sequence.frames) - 1) // 4]
-        scores = self.figures["orbit"]
-        known = [name for name in LABEL_SCORES if scores[name] is not None]
-        shown = ", ".join(f"{name.replace('_', ' ')} {scores[name]:.3f}" for name in known)
-        rows = [
-            (f"frame {number}, beside the {scores['reference']}: {shown}", sequence.scene, sequence.density(number))
-        ]
-        if self.truth is not None:
-            true = _true_density(sequence, self.truth, number)
-            rows.insert(0, (f"truth, frame {number}", on_grid(sequence.scene, self.truth.shape), true))
-        labels = [said for said, _, _ in rows]
-        tiles = [
-            [eight_bit(Orbit(scene).image(density, degrees, TILE_ROWS)) for degrees in TILE_AZIMUTHS]
-            for _, scene, density in rows
-        ]
-        write_sheet(path, tiles, [f"{degrees}\N{DEGREE SIGN}" for degrees in TILE_AZIMUTHS], labels)
+    def picture(self, number: int) -> Image:
+        """The clip's picture of a frame of the sequence, with its background where a mask hides it.
+
+        Linear radiance (rows, columns, 3).
+        """
+        frame = self.first + number - 1
+        picture = area_average(self.clip.frame(frame), *self.camera.size)
+        seen = self.clip.seen(frame, *self.camera.size)
+        return picture if seen is None else np.where(seen[..., None], picture, self.background)
+
+
+def first_frame(sequence: Sequence) -> int:
+    """Return the frame of the input clip's file, from 0, that the sequence's frame 1 belongs to."""
+    clip = sequence.scene.clip
+    return 0 if clip is None else clip.first
+
+
+def open_views(sequence: Sequence, paths: list[list[Path]], stack: ExitStack, notes: list[str]) -> list[ReferenceView]:
+    """Open the sequence's own input, and other cameras with their clips, by the paths of both.
+
+    The stack closes the clips. The notes take a sentence if the input cannot be compared with. It raises ValueError if
+    a file cannot be read, or a camera does not fit its clip.
+    """
+    scene = sequence.scene
+    views = []
+    if (plates := open_plates(scene.background, scene.camera)) is not None:
+        plates.close()
+        notes.append("The input view was left out: what stands behind the smoke there changes.")
+    elif scene.clip is not None:
+        try:
+            clip = stack.enter_context(Clip.open(scene.clip))
+            views.append(_view(INPUT, scene.camera, None, clip, 0, sequence))
+        except ValueError as error:
+            notes.append(f"The input view was left out: {error}")
+    for camera_path, clip_path in paths:
+        other = Scene.load(camera_path)
+        if other.camera is None:
+            raise ValueError(f"{camera_path}: has no [camera].")
+        clip = stack.enter_context(Clip.open(clip_path))
+        behind = None if other.background is None else background_picture(other)
+        views.append(_view(camera_path.stem, other.camera, behind, clip, first_frame(sequence), sequence))
+    return views
+
+
+def _view(
+    name: str, camera: Camera, background: Image | None, clip: Clip, first: int, sequence: Sequence
+) -> ReferenceView:
+    if camera.size[0] * clip.size[1] != camera.size[1] * clip.size[0]:
+        raise ValueError(
+            f"{clip.path}: its pictures are {clip.size[0]} x {clip.size[1]}, the camera's {camera.size[0]} x "
+            f"{camera.size[1]}; [camera] size must have the clip's shape."
+        )
+    if (last := first + sequence.frames[-1] - 1) >= len(clip):
+        raise ValueError(
+            f"{clip.path}: has {counted(len(clip), 'frame')}, but the sequence goes on to frame {last} of its clip "
+            "(from 0); give the whole clip of that camera."
+        )
+    camera = camera.resized(*clip.size).resized(*reduced_size(*clip.size, MAX_COMPARED_SIDE))
+    if camera.moves:
+        camera = replace(camera, matrix=camera.matrices[first], matrices=camera.matrices[first:])
+    if background is None:
+        background = Viewer(sequence.scene, camera).background(1)
+    elif background.ndim == 3:
+        background = area_average(background, *camera.size)
+    return ReferenceView(name, camera, background, clip, first)
 
 
 def evaluate(
-    sequence: Sequence, truth_path: Path | None = None, view_paths: tuple[tuple[Path, Path], ...] = ()
-) -> Evaluation:
+    sequence: Sequence, truth_path: Path | None, view_paths: list[list[Path]], picture_path: Path | None
+) -> Figures:
     """Compare a sequence with the truth and with other views, and its orbit with the truth's or with its own front.
 
     The last needs neither truth nor view: what smoke looks like from another side is, in its texture, what its
     front looks like. The truth is a truth.npz over the same box and at the same rate; resolutions may differ. Views
     are camera files and clips, whose frame 0 is the input clip's. With any, or without a truth, the input is
-    compared as well. It is a ValueError if a file cannot be read or does not belong to the sequence.
+    compared as well. With the path of a picture, a late frame is drawn from all around.
+
+    What is found are nested plain values, as JSON holds them; None where there is nothing to say. It is a ValueError if
+    a file cannot be read or does not belong to the sequence.
     """
     if not sequence.frames:
         raise ValueError(f"{sequence.directory}: there are no finished frames to evaluate yet.")
@@ -86,7 +146,26 @@ def evaluate(
         if view_paths or truth is None:
             figures["views"] = [_against_view(whole, view) for view in views]
     figures["orbit"] = _orbit_figures(sequence, truth)
-    return Evaluation(figures, sequence, truth)
+    if picture_path is not None:
+        _write_picture(picture_path, sequence, truth, figures["orbit"])
+    return figures
+
+
+def _write_picture(path: Path, sequence: Sequence, truth: Truth | None, scores: Figures) -> None:
+    """Write a late frame from all around, below the truth's where it is known, with its scores, as a PNG."""
+    number = sequence.frames[3 * (len(sequence.frames) - 1) // 4]
+    known = [name for name in LABEL_SCORES if scores[name] is not None]
+    shown = ", ".join(f"{name.replace('_', ' ')} {scores[name]:.3f}" for name in known)
+    rows = [(f"frame {number}, beside the {scores['reference']}: {shown}", sequence.scene, sequence.density(number))]
+    if truth is not None:
+        true = _true_density(sequence, truth, number)
+        rows.insert(0, (f"truth, frame {number}", on_grid(sequence.scene, truth.shape), true))
+    tiles = [
+        [eight_bit(Orbit(scene).image(density, degrees, TILE_ROWS)) for degrees in TILE_AZIMUTHS]
+        for _, scene, density in rows
+    ]
+    titles = [f"{degrees}\N{DEGREE SIGN}" for degrees in TILE_AZIMUTHS]
+    write_sheet(path, tiles, titles, [label for label, _, _ in rows])
 
 
 def _orbit_figures(sequence: Sequence, truth: Truth | None) -> Figures:
@@ -132,7 +211,6 @@ def _true_density(sequence: Sequence, truth: Truth, number: int) -> Volume:
 
 
 def _volumes(sequence: Sequence) -> Iterator[tuple[int, Volume, Volume | None]]:
-    """The frames as `volume_means` takes them."""
     for number in sequence.frames:
         # the first frame's velocity is the second's
         velocity = sequence.velocity_at_centres(number) if number > sequence.frames[0] else None

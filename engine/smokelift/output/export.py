@@ -8,7 +8,10 @@ What is left out or rounded does not show in a picture of 8 bits:
   `HALF_CODE`. Powers of two leave the last bits of a 16 bit float zero, which compresses well.
 - Quantized velocities move smoke by at most half of `VELOCITY_STEP` voxels per frame.
 
-Names, axes and the range of values are those of the program that reads the files (`smokelift.output.host`).
+Names, axes and the range of values are those of the program that reads the files (`smokelift.output.vdb.Host`). Every
+renderer and program that knows USD opens the USD file. Source: the schemas UsdVol Volume and OpenVDBAsset, the purposes
+``render`` and ``proxy`` of UsdGeom Imageable, and for the material, which USD has no shader of its own for, the nodes
+of MaterialX 1.39 (`pbrlib`).
 """
 
 import json
@@ -16,7 +19,7 @@ import math
 import re
 import shutil
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -25,12 +28,9 @@ import numpy as np
 
 from smokelift.checks.whole_files import write_text
 from smokelift.output.archive import FLAME
-from smokelift.output.files import INDEX, frame_path, proxy_path
-from smokelift.output.host import HOSTS, Host, HostName
-from smokelift.output.index import SequenceError
+from smokelift.output.index import INDEX, SequenceError, frame_path, proxy_path
 from smokelift.output.sequence import Sequence
-from smokelift.output.usd import light_properties, usd_text
-from smokelift.output.vdb import vdb_module, write_proxy, write_vdb
+from smokelift.output.vdb import HOSTS, Host, HostName, vdb_module, write_proxy, write_vdb
 from smokelift.scene import Domain, Medium
 from smokelift.transport import Array
 
@@ -60,6 +60,8 @@ SAMPLED_FRAMES = 5
 Precision = Literal["half", "quantized"]
 
 _OWN = re.compile(r"(smoke|proxy)_\d{4,}\.vdb")
+
+MATERIAL = "/Smoke/Material"
 
 
 @dataclass(frozen=True)
@@ -178,6 +180,11 @@ class _Export:
         return replace(medium, extinction=medium.extinction * self.peak)
 
     @property
+    def optics(self) -> dict[str, float]:
+        """What that smoke does to light, by the name of the property."""
+        return {name: getattr(self.medium, name) for name in ("extinction", "albedo", "anisotropy")}
+
+    @property
     def grids(self) -> tuple[str, ...]:
         """Names of the grids in the files of all frames."""
         burns = self.sequence.scene.medium.flame_color is not None
@@ -211,7 +218,7 @@ class _Export:
             self.domain,
             sequence.settings,
             None if flame is None else host.turned(flame),
-            metadata={"fps": sequence.fps, **UNITS, **light_properties(self.medium)},
+            metadata={"fps": sequence.fps, **UNITS, **self.optics},
             host=host,
         )
         if self.settings.proxy > 1:
@@ -220,10 +227,54 @@ class _Export:
         return sum(path.stat().st_size for path in paths)
 
     def usd(self) -> str:
-        """The text of the USD file."""
-        numbers = [self.sequence.file_number(number) for number in self.sequence.frames]
+        """The text of the USD file, whose frames have the numbers of the files that lie beside it."""
+        sequence, host = self.sequence, self.host
+        numbers = [sequence.file_number(number) for number in sequence.frames]
+        properties = "".join(f"            double {name} = {value:.9g}\n" for name, value in self.optics.items())
         proxy = self.settings.proxy > 1
-        return usd_text(numbers, self.grids, self.domain, self.medium, self.sequence.fps, self.host, proxy=proxy)
+        files = {number: frame_path(Path(), number, "vdb").name for number in numbers}
+        volumes = self._prim("Volume", "render" if proxy else "default", files, self.grids)
+        if proxy:
+            files = {number: proxy_path(Path(), number).name for number in numbers}
+            volumes += "\n" + self._prim("Proxy", "proxy", files, ("density",))
+        return f"""#usda 1.0
+(
+    defaultPrim = "Smoke"
+    metersPerUnit = 1
+    upAxis = "{host.up_axis}"
+    startTimeCode = {numbers[0]}
+    endTimeCode = {numbers[-1]}
+    timeCodesPerSecond = {sequence.fps:.9g}
+    framesPerSecond = {sequence.fps:.9g}
+)
+
+def Xform "Smoke" (
+    kind = "component"
+    customData = {{
+        dictionary smokelift = {{
+{properties}        }}
+    }}
+)
+{{
+{volumes}
+{_material(self.medium)}}}
+"""
+
+    def _prim(self, name: str, purpose: str, files: Mapping[int, str], grids: tuple[str, ...]) -> str:
+        """A volume with a purpose: ``"render"``, ``"proxy"``, or ``"default"`` for both; ``files`` are by number."""
+        low, high = _numbers(self.domain.min), _numbers(self.domain.max)
+        fields = "".join(f"        rel field:{grid} = </Smoke/{name}/{grid}>\n" for grid in grids)
+        assets = "\n".join(_asset(grid, files, vector=grid == self.host.velocity) for grid in grids)
+        return f"""    def Volume "{name}" (
+        prepend apiSchemas = ["MaterialBindingAPI"]
+    )
+    {{
+        uniform token purpose = "{purpose}"
+        float3[] extent = [({low}), ({high})]
+        rel material:binding = <{MATERIAL}>
+{fields}
+{assets}    }}
+"""
 
     def note(self) -> dict[str, Any]:
         """What the export is and how it was made."""
@@ -270,3 +321,67 @@ def _rounded(values: Array, step: float) -> Array:
 
 def _power_of_two(value: float) -> float:
     return 2.0 ** math.floor(math.log2(value))
+
+
+def _asset(grid: str, files: Mapping[int, str], *, vector: bool) -> str:
+    kind, role = ("half3", '            token vectorDataRoleHint = "Vector"\n') if vector else ("half", "")
+    samples = "".join(f"                {number}: @./{name}@,\n" for number, name in files.items())
+    return f"""        def OpenVDBAsset "{grid}"
+        {{
+            token fieldClass = "{"unknown" if vector else "fogVolume"}"
+            token fieldDataType = "{kind}"
+            token fieldName = "{grid}"
+{role}            asset filePath.timeSamples = {{
+{samples}            }}
+        }}
+"""
+
+
+def _material(medium: Medium) -> str:
+    """The material: absorption and scattering, 1/m, are those of density 1 times the field ``density``."""
+    scattering = [medium.extinction * albedo for albedo in medium.albedos]
+    absorption = [medium.extinction - scattered for scattered in scattering]
+    coefficients = "\n".join(
+        f"""        def Shader "{name}"
+        {{
+            uniform token info:id = "ND_multiply_vector3FA"
+            float3 inputs:in1 = ({_numbers(values)})
+            float inputs:in2.connect = <{MATERIAL}/Density.outputs:out>
+            float3 outputs:out
+        }}
+"""
+        for name, values in (("Absorption", absorption), ("Scattering", scattering))
+    )
+    return f"""    def Material "Material"
+    {{
+        token outputs:mtlx:volume.connect = <{MATERIAL}/Volume.outputs:out>
+
+        def Shader "Density"
+        {{
+            uniform token info:id = "ND_geompropvalue_float"
+            string inputs:geomprop = "density"
+            float outputs:out
+        }}
+
+{coefficients}
+        def Shader "Phase"
+        {{
+            uniform token info:id = "ND_anisotropic_vdf"
+            float3 inputs:absorption.connect = <{MATERIAL}/Absorption.outputs:out>
+            float3 inputs:scattering.connect = <{MATERIAL}/Scattering.outputs:out>
+            float inputs:anisotropy = {medium.anisotropy:.9g}
+            token outputs:out
+        }}
+
+        def Shader "Volume"
+        {{
+            uniform token info:id = "ND_volume"
+            token inputs:vdf.connect = <{MATERIAL}/Phase.outputs:out>
+            token outputs:out
+        }}
+    }}
+"""
+
+
+def _numbers(values: Iterable[float]) -> str:
+    return ", ".join(f"{value:.9g}" for value in values)

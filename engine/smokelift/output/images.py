@@ -16,7 +16,7 @@ from PIL import Image, ImageDraw
 from smokelift.checks.whole_files import atomic_path
 from smokelift.footage.image_files import ImageError
 from smokelift.footage.images import linear_to_srgb
-from smokelift.output.files import DISK_FULL
+from smokelift.output.index import DISK_FULL
 
 Tile = npt.NDArray[np.uint8]
 """An sRGB picture (rows, columns, 3)."""

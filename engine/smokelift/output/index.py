@@ -1,13 +1,22 @@
-"""`sequence.json`: what a sequence was made from, and which of its frames are finished."""
+"""What is in the directory of a sequence: its files' names, a lock that keeps a second run out, and `sequence.json`.
 
+That says what the sequence was made from, and which of its frames are finished. The operating system frees the lock
+when its process ends, however it ends, so none is ever stale.
+"""
+
+import errno
+import hashlib
 import json
 import math
+import os
 import platform
 import re
-from collections.abc import Callable, Iterable, Mapping
+import sys
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from importlib.metadata import PackageNotFoundError, version
+from itertools import starmap
 from pathlib import Path
 from statistics import median
 from typing import Any, get_origin, get_type_hints
@@ -16,9 +25,28 @@ import numpy as np
 
 from smokelift.checks import shown
 from smokelift.checks.whole_files import read_text, write_text
-from smokelift.output.files import INDEX, MAX_START_NUMBER
 from smokelift.scene import Domain, SceneError
 from smokelift.scene.checks import file_path
+
+INDEX = "sequence.json"
+RESUME = "resume.npz"
+LOCK = "run.lock"
+BACKGROUND = "background.exr"
+CONTACT_SHEET = "contact_sheet.png"
+ORBIT = "orbit.png"
+STRIP = "strip.png"
+PREVIEW = "preview.mp4"
+
+PICTURES = (CONTACT_SHEET, ORBIT, STRIP, PREVIEW)
+"""What shows a sequence at a glance; nothing is computed from it."""
+
+MAX_START_NUMBER = 1_000_000
+"""Largest number of a first file: Blender's timeline ends at 1,048,574."""
+
+DISK_FULL = (errno.ENOSPC, errno.EDQUOT)
+"""Numbers of the errors by which a system says that a disk, or a user's share of it, is full."""
+
+_FRAME = re.compile(r"smoke_\d{4,}\.(vdb|npz)|proxy_\d{4,}\.vdb")
 
 FORMAT = 1
 """Version of the file's structure (by definition); any other is refused."""
@@ -34,8 +62,99 @@ FILES = ("path", "image", "mask", "strokes")
 """Keys of a scene that hold paths."""
 
 
+def frame_path(directory: Path, number: int, kind: str) -> Path:
+    """Return the file with a number in its name; the kind is ``"vdb"`` or ``"npz"``."""
+    return directory / f"smoke_{number:04d}.{kind}"
+
+
+def proxy_path(directory: Path, number: int) -> Path:
+    """Return the coarse copy of the file with that number in its name."""
+    return directory / f"proxy_{number:04d}.vdb"
+
+
+def is_foreign(name: str) -> bool:
+    """Return whether no run writes a file of this name.
+
+    What begins with a dot is left over from a killed run, or the file manager's.
+    """
+    known = (INDEX, RESUME, LOCK, BACKGROUND, *PICTURES)
+    return not (name in known or name.startswith(".") or _FRAME.fullmatch(name))
+
+
+def checksum(paths: Iterable[Path]) -> str:
+    """Return the SHA-256 of the content of files, one after the other, as hexadecimal digits."""
+    total = hashlib.sha256()
+    for path in paths:
+        with path.open("rb") as file:
+            total.update(hashlib.file_digest(file, "sha256").digest())
+    return total.hexdigest()
+
+
+class Lock:
+    """An exclusive lock on a file, which exists while the lock is held."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._file: int | None = None
+
+    def acquire(self) -> bool:
+        """Take the lock; False if another process has it.
+
+        It raises OSError if the file cannot be made, or its file system has no locks.
+        """
+        while True:
+            file, taken = os.open(self._path, os.O_RDWR | os.O_CREAT, 0o644), False
+            try:
+                if not _try_lock(file):
+                    return False
+                # The run that had it before may delete the file after we open it and before we lock it.
+                with suppress(FileNotFoundError):
+                    taken = os.path.samestat(os.fstat(file), self._path.stat())
+                if taken:
+                    self._file = file
+                    return True
+            finally:
+                if not taken:
+                    os.close(file)
+
+    def release(self) -> None:
+        """Free the lock and delete its file."""
+        if self._file is None:
+            return
+        if sys.platform == "win32":
+            os.close(self._file)  # an open file cannot be deleted there
+            with suppress(OSError):
+                self._path.unlink()
+        else:
+            self._path.unlink(missing_ok=True)
+            os.close(self._file)
+        self._file = None
+
+
+def _try_lock(file: int) -> bool:
+    if sys.platform == "win32":
+        import msvcrt
+
+        try:
+            msvcrt.locking(file, msvcrt.LK_NBLCK, 1)
+        except OSError:  # the number for the lock of another differs between C libraries
+            return False
+    else:
+        import fcntl
+
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return False
+    return True
+
+
 class SequenceError(ValueError):
     """A directory that cannot be written to or opened, and why."""
+
+
+class DirectoryBusyError(SequenceError):
+    """A directory that another run is writing into."""
 
 
 def directory_path(value: object) -> Path:
@@ -46,12 +165,7 @@ def directory_path(value: object) -> Path:
         raise SequenceError(str(error)) from error
 
 
-class DirectoryBusyError(SequenceError):
-    """A directory that another run is writing into."""
-
-
-def software_versions() -> dict[str, str]:
-    """Return the versions of what a result depends on."""
+def _software_versions() -> dict[str, str]:
     versions = {"python": platform.python_version()}
     for name in ("smokelift", "numpy", "scipy", "taichi", "av"):
         with suppress(PackageNotFoundError):
@@ -78,13 +192,13 @@ class Index:
     """Size and content of the files that the run reads, and frames that it takes the background from, by their table in
     a scene file."""
     checksums: dict[str, str] = field(default_factory=dict)
-    """Of the frames' files, by name (`smokelift.output.files`)."""
+    """Of the frames' files, by name."""
     complete: bool = False
     """Whether the run came to its end."""
     start_number: int = 1
     """Number in the names of the files of frame 1."""
-    versions: dict[str, Any] = field(default_factory=software_versions)
-    """Of the software."""
+    versions: dict[str, Any] = field(default_factory=_software_versions)
+    """Of what a result depends on."""
 
     @property
     def numbers(self) -> tuple[int, ...]:
@@ -173,52 +287,47 @@ def json_value(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def without_folders(scene: Any) -> Any:
-    """Return the plain values of a scene with the names of its files in place of their paths."""
+def first_change(before: Index, now: Index) -> str:
+    """Return in words the first thing that differs between two runs and has to be the same, or an empty string."""
+    pairs = zip(_compared(before), _compared(now), strict=True)
+    return next(filter(None, (_difference(name, there, here) for (name, there), (_, here) in pairs)), "")
+
+
+def _compared(index: Index) -> Iterator[tuple[str, Any]]:
+    """What is compared, with the name that is said. Causes come before what follows from them.
+
+    Another clip, say, makes another scene, and another scene other settings of a part.
+    """
+    yield "sources", index.sources
+    # those of the whole run: settings of its parts follow from a scene too
+    yield "settings", {key: value for key, value in index.settings.items() if not isinstance(value, dict)}
+    yield "start_number", index.start_number
+    # checksums distinguish the files, wherever a project was moved to
+    yield "scene", _without_folders(index.scene) if index.sources else index.scene
+    yield "settings", index.settings
+    # a patch of Python changes no result
+    yield "versions", {name: found for name, found in index.versions.items() if name != "python"}
+
+
+def _without_folders(scene: Any) -> Any:
+    """The plain values of a scene with the names of its files in place of their paths."""
     if isinstance(scene, dict):
         return {
-            key: Path(value).name if key in FILES and isinstance(value, str) else without_folders(value)
+            key: Path(value).name if key in FILES and isinstance(value, str) else _without_folders(value)
             for key, value in scene.items()
         }
-    return [without_folders(value) for value in scene] if isinstance(scene, list) else scene
+    return [_without_folders(value) for value in scene] if isinstance(scene, list) else scene
 
 
-def _scene(index: Index) -> Any:
-    """A scene as it is compared: the checksums of its files distinguish them, wherever a project was moved to."""
-    return without_folders(index.scene) if index.sources else index.scene
-
-
-COMPARED: tuple[tuple[str, Callable[[Index], Any]], ...] = (
-    ("sources", lambda index: index.sources),
-    # those of the whole run: settings of its parts follow from a scene too
-    ("settings", lambda index: {key: value for key, value in index.settings.items() if not isinstance(value, dict)}),
-    ("start_number", lambda index: index.start_number),
-    ("scene", _scene),
-    ("settings", lambda index: index.settings),
-    # a patch of Python changes no result
-    ("versions", lambda index: {name: found for name, found in index.versions.items() if name != "python"}),
-)
-"""What has to be the same where a run goes on: the name that is said, and what of an index is compared. Causes come
-before what follows from them: another clip, say, makes another scene, and another scene other settings of a part."""
-
-
-def first_change(before: Index, now: Index) -> str:
-    """Return in words the first thing of `COMPARED` that differs between two runs, or an empty string."""
-    return next(filter(None, (difference(name, of(before), of(now)) for name, of in COMPARED)), "")
-
-
-def difference(place: str, there: Any, now: Any) -> str:
-    """Return the first difference between two plain values as words, or an empty string."""
+def _difference(place: str, there: Any, now: Any) -> str:
+    """The first difference between two plain values as words, or an empty string."""
     if isinstance(there, dict) and isinstance(now, dict):
-        for key in there | now:
-            found = difference(f"{place}.{key}", there.get(key), now.get(key))
-            if found:
-                return found
+        parts = [(f"{place}.{key}", there.get(key), now.get(key)) for key in there | now]
+    elif isinstance(there, list) and isinstance(now, list) and len(there) == len(now):
+        parts = [(f"{place}[{n}]", *pair) for n, pair in enumerate(zip(there, now, strict=True))]
+    elif there == now:
         return ""
-    if isinstance(there, list) and isinstance(now, list) and len(there) == len(now):
-        parts = (difference(f"{place}[{n}]", *pair) for n, pair in enumerate(zip(there, now, strict=True)))
-        return next(filter(None, parts), "")
-    if there == now:
-        return ""
-    before, after = (text if len(text) <= 60 else f"{text[:57]}..." for text in map(json.dumps, (there, now)))
-    return f"{place} was {before} and is now {after}"
+    else:
+        before, after = (text if len(text) <= 60 else f"{text[:57]}..." for text in map(json.dumps, (there, now)))
+        return f"{place} was {before} and is now {after}"
+    return next(filter(None, starmap(_difference, parts)), "")

@@ -1,6 +1,7 @@
-"""OpenVDB files as Blender expects them: a fog volume `density` and a vector grid `velocity` in m/s.
+"""OpenVDB files with their grids, units and signs, as Blender or another host expects them.
 
-Where a clip shows fire, a fog volume `flame` holds its emission, radiance per meter, in one channel.
+A file has a fog volume `density`, a vector grid `velocity` in m/s, and where a clip shows fire a fog volume `flame`:
+its emission, radiance per meter, in one channel.
 
 There is no standalone package of OpenVDB for Python. The vdb extra installs bpy, whose wheel contains one in a folder
 that is not on `sys.path`. bpy itself is never imported.
@@ -14,23 +15,26 @@ import importlib.util
 import json
 import sys
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
 
-from smokelift.checks import Array
 from smokelift.checks.whole_files import atomic_path
 from smokelift.output.archive import FLAME
-from smokelift.output.host import BLENDER, Host
 from smokelift.scene import Domain
 from smokelift.scene.domain import box_around
-from smokelift.transport import StaggeredGrid, at_centres, block_means, faces_in
+from smokelift.transport import Array, StaggeredGrid, at_centres, block_means, faces_in
 from smokelift.transport.grid import finite
+
+HostName = Literal["blender", "houdini", "unreal"]
+
+Axes = tuple[tuple[int, int], tuple[int, int], tuple[int, int]]
 
 VELOCITY_MARGIN = 2
 """Voxels around the smoke in which velocity is kept: motion blur reads it beyond the edge."""
@@ -53,6 +57,52 @@ _LIMIT = np.float32(np.finfo(np.float16).max)
 
 _SPARE_BYTES = 65536
 """Bytes that are written after a file and taken away again, to see whether the disk is full."""
+
+
+@dataclass(frozen=True)
+class Host:
+    """What a program expects."""
+
+    velocity: str = "velocity"
+    """Name of the grid of the velocity."""
+    up_axis: str = "Z"
+    """``"Z"`` or ``"Y"``."""
+    axes: Axes = ((0, 1), (1, 1), (2, 1))
+    """For each of the program's axes ours, and 1, or -1 where it points the other way."""
+    left_handed: bool = False
+    """Whether these axes mirror the smoke."""
+    eight_bits: bool = False
+    """Whether it keeps densities from 0 to 1 in 8 bits: they are divided by the largest of the sequence."""
+    whole_box: bool = False
+    """Whether it puts the pivot at the corner of what is active: then the box's corners are, in every frame."""
+
+    def box(self, domain: Domain) -> Domain:
+        """The box of the smoke in the program's axes."""
+        ends = [sorted((sign * domain.min[axis], sign * domain.max[axis])) for axis, sign in self.axes]
+        (x0, x1), (y0, y1), (z0, z1) = ends
+        nx, ny, nz = (domain.resolution[axis] for axis, _ in self.axes)
+        return Domain((x0, y0, z0), (x1, y1, z1), (nx, ny, nz))
+
+    def turned(self, values: Array) -> Array:
+        """A volume, or the vectors of one (x, y, z, 3), in the program's axes."""
+        order = [axis for axis, _ in self.axes]
+        turned = values.transpose(*order, *range(3, values.ndim))
+        turned = turned[tuple(slice(None, None, sign) for _, sign in self.axes)]
+        return (
+            turned if values.ndim == 3 else turned[..., order] * np.array([sign for _, sign in self.axes], np.float32)
+        )
+
+
+BLENDER = Host()
+
+HOSTS: Mapping[HostName, Host] = {
+    "blender": BLENDER,
+    "houdini": Host(velocity="vel", up_axis="Y", axes=((0, 1), (2, 1), (1, -1))),
+    "unreal": Host(axes=((0, 1), (1, -1), (2, 1)), left_handed=True, eight_bits=True, whole_box=True),
+}
+"""Hosts by the name of the program. Unreal's importer (5.4) takes voxels for those of its left-handed axes, the corner
+of the box around all active voxels of a sequence for the pivot, and a grid ``density`` for 8 bits from 0 to 1 (by
+definition)."""
 
 
 class VdbUnavailable(RuntimeError):  # noqa: N818  (it says what is the matter better than ...Error)

@@ -16,13 +16,29 @@ from typing import Any
 
 import numpy.typing as npt
 
-import smokelift.output.files as files
 from smokelift.checks import counted
 from smokelift.checks.whole_files import atomic_path
-from smokelift.output.archive import FLAME, VELOCITY, write_arrays
+from smokelift.output.archive import FLAME, VELOCITY, ResumeState, write_arrays
 from smokelift.output.images import write_image
-from smokelift.output.index import BOX, DirectoryBusyError, Index, SequenceError, first_change, json_value
-from smokelift.output.resume import ResumeState
+from smokelift.output.index import (
+    BACKGROUND,
+    BOX,
+    DISK_FULL,
+    INDEX,
+    LOCK,
+    MAX_START_NUMBER,
+    RESUME,
+    DirectoryBusyError,
+    Index,
+    Lock,
+    SequenceError,
+    checksum,
+    first_change,
+    frame_path,
+    is_foreign,
+    json_value,
+    proxy_path,
+)
 from smokelift.output.vdb import MIN_PROXY_VOXELS, VdbUnavailable, checked_volume, vdb_module, write_proxy, write_vdb
 from smokelift.scene import Background, CompleteScene, Domain, scene_to_dict
 from smokelift.transport import Array, Faces, Velocity, require_same_shape
@@ -64,17 +80,17 @@ class SequenceWriter:
         self._domain = scene.domain
         self._background = background
         if background is not None:
-            scene = replace(scene, background=Background(image=self.directory.resolve() / files.BACKGROUND))
+            scene = replace(scene, background=Background(image=self.directory.resolve() / BACKGROUND))
         # Through JSON, so that it compares equal to what is read back.
         run = {"scene": scene_to_dict(scene, self.directory.resolve()), "settings": dict(settings)}
         origins = json_value({"choices": choices, "provenance": provenance, "sources": sources or {}})
-        if not 0 <= start_number <= files.MAX_START_NUMBER:
-            raise ValueError(f"start_number must be from 0 to {files.MAX_START_NUMBER}, not {start_number}")
+        if not 0 <= start_number <= MAX_START_NUMBER:
+            raise ValueError(f"start_number must be from 0 to {MAX_START_NUMBER}, not {start_number}")
         self._index = Index(**json.loads(json.dumps(run, allow_nan=False)), **origins, start_number=start_number)
         self._npz = npz
         self._kinds: tuple[str, ...] = ()
         self._resume = resume
-        self._lock = files.Lock(self.directory / files.LOCK)
+        self._lock = Lock(self.directory / LOCK)
 
     @property
     def finished(self) -> tuple[int, ...]:
@@ -99,10 +115,10 @@ class SequenceWriter:
             self._take_over()
             self._index.write(self.directory)  # first: without it a run that goes on takes all else for another's
             if self._background is not None:
-                write_image(self.directory / files.BACKGROUND, self._background)
+                write_image(self.directory / BACKGROUND, self._background)
         except OSError as error:
             self._lock.release()
-            raise self._write_error(files.INDEX, error) from error
+            raise self._write_error(INDEX, error) from error
         except BaseException:
             self._lock.release()
             raise
@@ -116,9 +132,9 @@ class SequenceWriter:
                 self._check_files()
                 self._index = replace(self._index, complete=True)
                 self._index.write(self.directory)
-                (self.directory / files.RESUME).unlink(missing_ok=True)
+                (self.directory / RESUME).unlink(missing_ok=True)
         except OSError as failure:
-            raise self._write_error(files.INDEX, failure) from failure
+            raise self._write_error(INDEX, failure) from failure
         finally:
             self._lock.release()
 
@@ -170,27 +186,26 @@ class SequenceWriter:
                     arrays = {"density": rho, **dict(zip(VELOCITY, velocity.faces, strict=True))}
                     write_arrays(path, arrays if fire is None else {**arrays, FLAME: fire})
             if "vdb" in self._kinds and math.prod(self._domain.shape) >= MIN_PROXY_VOXELS:  # of all frames or of none
-                proxy = files.proxy_path(self.directory, self._index.file_number(number))
+                proxy = proxy_path(self.directory, self._index.file_number(number))
                 write_proxy(proxy, rho, box, flame=fire, lattice=self._domain)
             frames = {**self._index.frames, str(number): json_value({**(figures or {}), **own_box})}
-            checksums = {**self._index.checksums, **{path.name: files.checksum([path]) for path in paths}}
+            checksums = {**self._index.checksums, **{path.name: checksum([path]) for path in paths}}
             grown = replace(self._index, frames=frames, checksums=checksums)
             grown.write(self.directory)
             # Last: a state without its frame would pass for a frame that was lost.
-            state.write(self.directory / files.RESUME)
+            state.write(self.directory / RESUME)
             self._index = grown  # only now: a run that goes on drops a frame without its state
         except OSError as error:
             raise self._write_error(f"frame {number}", error) from error
 
     def _path(self, number: int, kind: str) -> Path:
-        """The file of a frame."""
-        return files.frame_path(self.directory, self._index.file_number(number), kind)
+        return frame_path(self.directory, self._index.file_number(number), kind)
 
     def _take_over(self) -> None:
         """Judge what is in the directory, and read what can be gone on from."""
         there = _earlier_run(self.directory, self._resume)
         if there is None:
-            self._clear(files.INDEX)  # nothing else is written before it
+            self._clear(INDEX)  # nothing else is written before it
             return
         if what := first_change(there, self._index):
             raise SequenceError(
@@ -211,7 +226,7 @@ class SequenceWriter:
             leftover.unlink(missing_ok=True)
 
     def _last_state(self, there: Index) -> ResumeState | None:
-        path = self.directory / files.RESUME
+        path = self.directory / RESUME
         try:
             last = ResumeState.last_number(path)
             if last is None:
@@ -230,7 +245,7 @@ class SequenceWriter:
                 )
 
     def _write_error(self, what: str, error: OSError) -> SequenceError:
-        reason = "the disk is full" if error.errno in files.DISK_FULL else str(error)
+        reason = "the disk is full" if error.errno in DISK_FULL else str(error)
         return SequenceError(
             f"{self.directory}: {what} could not be written: {reason}; "
             f"finished frames stay ({len(self.finished)}), and a resumed run goes on from them"
@@ -248,10 +263,10 @@ def check_directory(directory: Path, *, resume: bool) -> None:
 
 def count_finished(directory: Path) -> int:
     """Return how many frames of a directory a `SequenceWriter` that resumes its run would keep."""
-    if not (directory / files.INDEX).is_file():
+    if not (directory / INDEX).is_file():
         return 0
     try:
-        return len(_kept(Index.read(directory), ResumeState.last_number(directory / files.RESUME)))
+        return len(_kept(Index.read(directory), ResumeState.last_number(directory / RESUME)))
     except OSError as error:
         raise _not_resumable(error) from error
 
@@ -287,9 +302,9 @@ def written_kinds(npz: bool) -> tuple[str, ...]:
 def _earlier_run(directory: Path, resume: bool) -> Index | None:
     """The run in a directory that can be gone on with, or None if there is nothing; SequenceError for all else."""
     names = sorted(file.name for file in directory.iterdir() if not file.name.startswith("."))
-    has_index = files.INDEX in names
+    has_index = INDEX in names
     # Without an index nothing here was written by a run, whatever it is called.
-    foreign = [name for name in names if files.is_foreign(name) or not (has_index or name == files.LOCK)]
+    foreign = [name for name in names if is_foreign(name) or not (has_index or name == LOCK)]
     if foreign:
         raise SequenceError(
             f"{directory}: holds other files ({foreign[0]}); nothing was overwritten, choose an empty directory"

@@ -1,4 +1,4 @@
-"""The main job (algorithms 1 and 4): a clip in, one frame of density and velocity after the other out.
+"""The loop over frames, by the parts of a method (algorithms 1 and 4): a clip in, density and velocity of each out.
 
 rho_1 and rho_2 are fitted to their pictures alone, and u_2 = VelRecon(rho_1, rho_2); then for t = 3, 4, ...
     u~_t   = Project(advect(u_t-1, u_t-1))          prediction of the velocity
@@ -14,20 +14,127 @@ from typing import Any
 
 import numpy as np
 
-from smokelift.density import FittedDensity, ViewSet
+from smokelift.baselines.paper_method import AllCarried, FixedRateDescent, OrthogonalCopy, PaperVelocity
+from smokelift.checks import require_kind
+from smokelift.density import (
+    AdvectedDetail,
+    DensityFit,
+    DepthPrior,
+    DetailedDepth,
+    FittedDensity,
+    GradientFit,
+    NothingCarried,
+    RoundDepth,
+    TemporalPrior,
+    ViewSet,
+)
 from smokelift.density.flame import flame_emission
 from smokelift.density.hull import project_voxels
 from smokelift.footage.images import Picture
-from smokelift.pipeline.carried_state import CarriedState
+from smokelift.output.archive import ResumeState
 from smokelift.pipeline.clip_fit import clip_psnr
-from smokelift.pipeline.method import Method
 from smokelift.render import Volume
 from smokelift.render.device import products_on_one_thread
+from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot
-from smokelift.transport import Array, Velocity
+from smokelift.transport import Array, Velocity, halved
+from smokelift.velocity import CoarseToFine, VelocityEstimator
 from smokelift.velocity.estimator import DensityPair
 from smokelift.velocity.optical_flow import PicturePair
 from smokelift.velocity.pyramid import advect_near, refine_near_smoke
+
+
+@dataclass(frozen=True)
+class Method:
+    """How a clip is reconstructed, part by part.
+
+    Attributes
+    ----------
+    density_fit
+        Finds a density that renders to the pictures.
+    depth_prior
+        What is assumed of the depth, which one picture leaves undetermined.
+    velocity_estimator
+        Finds the velocity between two densities, and predicts the next.
+    temporal_prior
+        What a frame takes over from the one before.
+    optical_flow
+        Whether the estimator gets the pictures, where one camera that stands still alone sees the smoke, to correct the
+        velocity by the optical flow in them (`velocity.optical_flow`).
+    """
+
+    density_fit: DensityFit
+    depth_prior: DepthPrior
+    velocity_estimator: VelocityEstimator
+    temporal_prior: TemporalPrior
+    optical_flow: bool = True
+
+
+def other_parts(method: Method, settings: Settings) -> dict[str, str | bool]:
+    """The names of what stands for other parts in a method than the settings ask for, by part."""
+    asked = _names(compose(settings))
+    return {part: name for part, name in _names(method).items() if name != asked[part]}
+
+
+def _names(method: Method) -> dict[str, str | bool]:
+    return {part: of if isinstance(of, bool) else type(of).__name__ for part, of in vars(method).items()}
+
+
+def compose(settings: Settings) -> Method:
+    """The method that settings ask for."""
+    require_kind(settings, Settings, "settings", "Settings (Settings.preset makes them)")
+    if settings.method == "paper":
+        return Method(FixedRateDescent(), OrthogonalCopy(), PaperVelocity(), AllCarried(), optical_flow=False)
+    smooth = RoundDepth()
+    return Method(
+        density_fit=GradientFit(settings.density),
+        depth_prior=DetailedDepth(smooth, settings.detail, settings.seed) if settings.detail > 0 else smooth,
+        velocity_estimator=CoarseToFine(settings.velocity),
+        temporal_prior=AdvectedDetail(settings.transport) if settings.transport > 0 else NothingCarried(),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class CarriedState:
+    """What the next frame needs of a frame.
+
+    Attributes
+    ----------
+    number
+        Of the frame, 1 for the clip's first.
+    density : (nx, ny, nz) float32
+    velocity
+        In m/s, on the grid of its estimate, all over the domain.
+    smooth_density : (nx, ny, nz) float32, optional
+        The density without made-up detail, from which velocity is estimated; None if nothing was made up.
+    for_advection : (nx, ny, nz) float32, optional
+        What the next frame carries along, if not the density: see `smokelift.density.FittedDensity`.
+    picture : (rows, columns), optional
+        The picture from which optical flow to the next one is found; None where it is not used. It is not stored.
+    """
+
+    number: int
+    density: Volume
+    velocity: Velocity
+    smooth_density: Volume | None = None
+    for_advection: Volume | None = None
+    picture: Picture | None = None
+
+    def stored(self) -> ResumeState:
+        """What a run that is resumed after the frame reads."""
+        volumes = {"smooth": self.smooth_density, "steady": self.for_advection}
+        kept = {name: volume for name, volume in volumes.items() if volume is not None}
+        return ResumeState(self.number, self.density, self.velocity.faces, kept)
+
+    @staticmethod
+    def read(state: ResumeState, shot: Shot) -> "CarriedState":
+        """The inverse of `stored`."""
+        velocity = Velocity(state.velocity, shot.optics.domain.voxel_size, shot.scene.closed)
+        shape = shot.optics.domain.resolution
+        while shape != velocity.shape:
+            shape, velocity = halved(shape), replace(velocity, voxel_size=2 * velocity.voxel_size)
+        smooth, for_advection = (state.extra.get(name) for name in ("smooth", "steady"))
+        return CarriedState(state.number, state.density, velocity, smooth, for_advection)
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,12 +203,19 @@ def _frame(
     fitted, taken_over = _density(views, before, predicted, shot, method)
     picture = _flow_picture(views) if flow else None
     flame = _flame(index, fitted.density, shot)
-    fit = _fit_figures(index, fitted, shot)
+    # what a fit calls psnr is that of the working pictures; frames without smoke have none, and cost nothing
+    fit = {name.replace("psnr", "psnr_working"): value for name, value in fitted.figures.items()}
+    if "psnr_working" in fit:
+        fit = {**clip_psnr(shot, index, fitted.density), **fit}
     fit_done = time.perf_counter()
     if before is None:
         velocity = estimated = Velocity.zero(domain.resolution, domain.voxel_size, shot.scene.closed)
     else:
-        pair = DensityPair(*_measured(before, fitted), dt, domain.voxel_size, shot.scene.closed, shot.scene.inflow())
+        # without what is made up, if that is known of both: it shows no motion of its own
+        first, second = before.smooth_density, fitted.smooth_density
+        if first is None or second is None:
+            first, second = before.density, fitted.density
+        pair = DensityPair(first, second, dt, domain.voxel_size, shot.scene.closed, shot.scene.inflow())
         pictures = None
         if views is not None and before.picture is not None and picture is not None:
             pictures = PicturePair(before.picture, picture, views.views[0].camera, domain)
@@ -131,21 +245,6 @@ def _seen(index: int, shot: Shot) -> ViewSet | None:
 def _flow_picture(views: ViewSet | None) -> Picture | None:
     """What optical flow is found in: roots of the only camera's optical depths, so that thin smoke counts."""
     return None if views is None else np.sqrt(views.views[0].optical_depth)
-
-
-def _fit_figures(index: int, fitted: FittedDensity, shot: Shot) -> dict[str, float]:
-    """The figures of a fit; what it calls ``psnr`` is that of the working pictures."""
-    working = {name.replace("psnr", "psnr_working"): value for name, value in fitted.figures.items()}
-    if "psnr_working" not in working:  # frames without smoke cost nothing
-        return working
-    return {**clip_psnr(shot, index, fitted.density), **working}
-
-
-def _measured(before: CarriedState, fitted: FittedDensity) -> tuple[Volume, Volume]:
-    """The densities of two frames, without what is made up if that is known of both: it shows no motion of its own."""
-    if before.smooth_density is None or fitted.smooth_density is None:
-        return before.density, fitted.density
-    return before.smooth_density, fitted.smooth_density
 
 
 def _density(

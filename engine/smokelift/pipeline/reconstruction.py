@@ -7,15 +7,12 @@ from typing import Any
 
 from smokelift.checks import require_kind
 from smokelift.footage.clip import Clip
-from smokelift.output.files import checksum
-from smokelift.output.index import directory_path
+from smokelift.output.index import checksum, directory_path
 from smokelift.output.sequence import Sequence
 from smokelift.output.writer import SequenceWriter
-from smokelift.pipeline.carried_state import CarriedState
-from smokelift.pipeline.loop import Frame, frames_after
-from smokelift.pipeline.method import Method, compose, other_parts
-from smokelift.report.result import provenance
-from smokelift.report.views import choices, part
+from smokelift.pipeline.loop import CarriedState, Frame, Method, compose, frames_after, other_parts
+from smokelift.report.facts import provenance
+from smokelift.report.sentences import choices, part
 from smokelift.scene import EnvironmentLight, Scene
 from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.settings import Settings

@@ -17,13 +17,13 @@ from extension_products import NAMED, PLATFORMS, Product
 from smokelift.app.cli import command_parser
 from smokelift.app.commands import directed
 from smokelift.checks import Source
-from smokelift.direct import new_sequence
+from smokelift.direct import state
 from smokelift.direct.retiming import playback
 from smokelift.extraction.find_background import MOVING_CAMERA
 from smokelift.footage.frame_source import ClipError, numbered_files
 from smokelift.footage.image_files import READABLE
 from smokelift.output.export import ASSET, NOTE
-from smokelift.output.files import INDEX, frame_path, proxy_path
+from smokelift.output.index import INDEX, frame_path, proxy_path
 from smokelift.output.vdb import MIN_PROXY_VOXELS
 from smokelift.scene import SIDES, EnvironmentLight, SceneError
 from smokelift.setup.settings import LIMITS, QUALITIES, Settings
@@ -77,7 +77,7 @@ def test_directions() -> None:
             needed = ["--frames", "9"] if direction == "continue" else ["--speed", "2"] if direction == "retime" else []
             parser.parse_args([direction, "take", "--out", "new", *needed, option, *words])
     assert (contract.SLOWEST, contract.FASTEST) == directed.SPEEDS
-    assert contract.SHORTEST == new_sequence.MIN_FRAMES
+    assert contract.SHORTEST == state.MIN_FRAMES
 
 
 def test_pictures() -> None:

@@ -13,7 +13,7 @@ from smokelift.app.cli import main
 
 MODULE = [sys.executable, "-m", "smokelift"]
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(Path(smokelift.__file__).parents[1])}
-QUICK = ("--quality", "draft")
+QUICK = ("--quality", "draft", "--detail", "0")
 
 
 def command(*words: object) -> int:

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from smokelift.app import progress
-from smokelift.app.progress import reporter
+from smokelift.app.progress import JsonReporter, Reporter
 from smokelift.checks import Finding
 
 
@@ -26,7 +26,7 @@ def lines(capsys: pytest.CaptureFixture[str]) -> list[dict[str, Any]]:
 
 
 def test_json_events_are_a_line_each(capsys) -> None:
-    with reporter("json") as say:
+    with JsonReporter() as say:
         say.note('two\nlines and "quotes"')
         say.note(Finding("bars", doubt=True))
         say.start(4, 1)
@@ -45,7 +45,7 @@ def test_json_events_are_a_line_each(capsys) -> None:
 
 def test_a_forecast_is_corrected_by_the_runs_own_frames(capsys, monkeypatch) -> None:
     """It is all that is known before the first frame, one of two after that, and nothing after ten."""
-    with reporter("json") as say:
+    with JsonReporter() as say:
         say.start(24, 4, 80.0)
         for number in range(5, 25):
             say.frame(number, figures(2.0))
@@ -56,7 +56,7 @@ def test_a_forecast_is_corrected_by_the_runs_own_frames(capsys, monkeypatch) -> 
     # what passes between frames counts, such as files that are written, and what a first frame took before the start
     clock = iter([0.0, 0.0, 5.0, 11.0])
     monkeypatch.setattr(progress, "time", SimpleNamespace(monotonic=lambda: next(clock)))
-    say = reporter("json")
+    say = JsonReporter()
     say.start(4, 0)
     for number, seconds in ((1, 30.0), (2, 2.0)):
         say.frame(number, figures(seconds))
@@ -64,13 +64,13 @@ def test_a_forecast_is_corrected_by_the_runs_own_frames(capsys, monkeypatch) -> 
 
 
 def test_text_names_what_matters(capsys) -> None:
-    with reporter("text") as say:
+    with Reporter() as say:
         say.note("Light [not] given: /a/[bold]path")
         say.start(3, 0)
         for number, psnr in enumerate((40.0, 30.0, 20.0), 1):
             say.frame(number, figures(1.0, psnr=psnr))
         say.finish("3 frames in out.", {})
-    with reporter("text") as say:
+    with Reporter() as say:
         say.start(1, 0)
         say.frame(1, figures(1.0, hull_share=0.0))
     out = capsys.readouterr().out

@@ -66,7 +66,7 @@ def test_what_cannot_be_written_is_refused_before_the_clip_is_read(here, shot, c
     def look(*_arguments: object) -> None:
         raise AssertionError("the clip was read")
 
-    monkeypatch.setattr("smokelift.app.commands.reconstruct.reconstruct", look)
+    monkeypatch.setattr("smokelift.pipeline.reconstruct", look)
     assert said in refused(capsys, "reconstruct", shot, *words)
     assert names(here / "others") == ["holiday.jpg"] and names(here / "deep") == []
 

@@ -16,8 +16,7 @@ from types import SimpleNamespace
 import pytest
 
 import smokelift
-from smokelift.batch.shots import BatchShot
-from smokelift.batch.work import Record
+from smokelift.batch.shots import BatchShot, Record
 
 if importlib.util.find_spec("distributed") is None:
     pytest.skip("Dask distributed is not installed", allow_module_level=True)

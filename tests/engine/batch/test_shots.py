@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from smokelift.app.commands import reconstruct
+from smokelift.app.commands.clips import add_reconstruct_options
 from smokelift.batch.shots import BatchShot, read_shots
 
 
@@ -13,7 +13,7 @@ def read(folder: Path, text: str) -> tuple[BatchShot, ...]:
     path = folder / "shots.toml"
     path.write_text(text)
     parser = argparse.ArgumentParser(exit_on_error=False)
-    reconstruct.add_options(parser)
+    add_reconstruct_options(parser)
     return read_shots(path, parser)
 
 

@@ -14,17 +14,8 @@ from pathlib import Path
 import pytest
 
 import smokelift
-from smokelift.batch.shots import BatchShot
-from smokelift.batch.work import (
-    RETRIES,
-    Record,
-    finish_shot,
-    inspect_shot,
-    is_finished,
-    read_index,
-    read_record,
-    run_here,
-)
+from smokelift.batch.shots import BatchShot, Record, is_finished, read_index, read_record
+from smokelift.batch.work import RETRIES, finish_shot, inspect_shot, run_here
 
 SECONDS = 120.0
 """Longest wait for a batch to end, for a machine that does much else."""

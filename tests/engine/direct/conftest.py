@@ -3,7 +3,7 @@
 import pytest
 
 from smokelift import Sequence
-from smokelift.direct.new_sequence import open_source
+from smokelift.direct.state import open_source
 from tests.engine.direct.rising import write_plume
 
 

@@ -8,8 +8,7 @@ import numpy as np
 
 from smokelift import Domain, Sequence, Velocity
 from smokelift.direct.continuation import Continuation, continue_sequence
-from smokelift.direct.inflow import Inflow
-from smokelift.direct.simulation import Combustion, Physics, Simulation
+from smokelift.direct.simulation import Combustion, Inflow, Physics, Simulation
 from smokelift.direct.state import SmokeState
 from smokelift.direct.surroundings import Ball, Surroundings
 from smokelift.output.writer import SequenceWriter

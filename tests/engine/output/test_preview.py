@@ -7,11 +7,19 @@ import pytest
 from small_sequence import at_rest, names
 
 from smokelift import Clip, Sequence
-from smokelift.output.files import PICTURES
-from smokelift.output.framing import MIN_ASPECT, frame_smoke
 from smokelift.output.images import write_image
-from smokelift.output.preview import ORBIT_COLUMNS, SHEET_ANGLES, SHEET_HEIGHT, STRIP_FRAMES, Preview, write_previews
-from smokelift.output.viewer import Viewer
+from smokelift.output.index import PICTURES
+from smokelift.output.preview import (
+    MIN_ASPECT,
+    ORBIT_COLUMNS,
+    SHEET_ANGLES,
+    SHEET_HEIGHT,
+    STRIP_FRAMES,
+    Preview,
+    frame_smoke,
+    write_previews,
+)
+from smokelift.output.sequence import Viewer
 from smokelift.scene import Background, Scene, orbit
 
 
@@ -57,7 +65,9 @@ def test_a_strip_shows_consecutive_frames_from_the_side(plume, tmp_path, count, 
     assert top[0] - top[-1] == pytest.approx(rise * SHEET_HEIGHT / shown.framing.height, abs=10)
 
 
-def test_the_video_turns_while_it_plays(plume, tmp_path) -> None:
+def test_the_video_turns_while_it_plays(plume, tmp_path, monkeypatch) -> None:
+    for height in ("SHEET_HEIGHT", "PREVIEW_HEIGHT"):
+        monkeypatch.setattr(f"smokelift.output.preview.{height}", 112)
     still = [plume.densities[2]] * 5
     scene = plume.write(tmp_path / "clip", still, plume.scene)
     scene = replace(scene, clip=replace(scene.clip, fps=4.0))

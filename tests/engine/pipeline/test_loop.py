@@ -79,10 +79,10 @@ def run(plume, draft, tmp_path_factory) -> tuple[list[Frame], Path]:
 
 
 @pytest.fixture(scope="module")
-def along_the_path(tracked, draft, tmp_path_factory) -> tuple[list[Frame], Path]:
+def along_the_path(tracked, smooth, tmp_path_factory) -> tuple[list[Frame], Path]:
     """The frames from a camera that moves, and where they were written."""
     out = tmp_path_factory.mktemp("path") / "out"
-    return frames_written(tracked, draft, out), out
+    return frames_written(tracked, smooth, out), out
 
 
 @pytest.fixture(scope="module")
@@ -116,7 +116,7 @@ def test_picture_mass_and_motion_are_about_right(run, plume) -> None:
             assert np.abs(mean[:2]).max() < 0.3 * speed
 
 
-def test_walls_and_inlets_of_the_scene_are_kept(coarse, draft, tmp_path) -> None:
+def test_walls_and_inlets_of_the_scene_are_kept(coarse, smooth, tmp_path) -> None:
     """And a run that is complete is not computed again."""
     inflows, estimated = [], []
 
@@ -129,7 +129,7 @@ def test_walls_and_inlets_of_the_scene_are_kept(coarse, draft, tmp_path) -> None
     scene = replace(coarse.with_frames(0, 2), closed=("z-",), inlets=(Inlet((0, 0, 0.3), 0.2),))
     frames: list[Frame] = []
     with Clip.open(scene.clip) as clip:
-        shot = prepare_shot(clip, scene, draft)
+        shot = prepare_shot(clip, scene, smooth)
         method = replace(compose(shot.settings), velocity_estimator=Watched(shot.settings.velocity))
         for resume in (False, True):
             sequence = Reconstruction(shot, method).write(
@@ -168,7 +168,7 @@ def test_a_run_that_was_cut_off_goes_on_exactly(run, plume, draft, tmp_path) -> 
     goes_on_exactly(plume.scene, draft, tmp_path / "out", 3, run[1])
 
 
-def test_a_file_that_was_replaced_under_its_name_is_not_mixed_in(plume, draft, tmp_path) -> None:
+def test_a_file_that_was_replaced_under_its_name_is_not_mixed_in(plume, smooth, tmp_path) -> None:
     scene = plume.write(tmp_path / "clip", plume.densities[:2])
     behind = np.zeros((56, 40, 3))
     write_image(tmp_path / "plate.png", behind)
@@ -178,7 +178,7 @@ def test_a_file_that_was_replaced_under_its_name_is_not_mixed_in(plume, draft, t
     clip = replace(scene.clip, mask=tmp_path / "mask.png")
     background = Background(image=tmp_path / "plate.png", strokes=tmp_path / "strokes.png")
     with Clip.open(clip) as opened:
-        shot = prepare_shot(opened, replace(scene, clip=clip, background=background), draft)
+        shot = prepare_shot(opened, replace(scene, clip=clip, background=background), smooth)
         before = sources(shot)
         for replaced, name in (
             ("clip", "clip/frame_0001.png"),
@@ -194,12 +194,12 @@ def test_a_file_that_was_replaced_under_its_name_is_not_mixed_in(plume, draft, t
             before = after
 
 
-def test_an_estimated_background_resumes_and_moves(plume, draft, tmp_path) -> None:
+def test_an_estimated_background_resumes_and_moves(plume, smooth, tmp_path) -> None:
     """What was estimated is kept with the sequence: the run goes on, and the directory can be moved."""
     heights = np.linspace(-0.3, 1.9, 8)
     filmed = plume.write(tmp_path / "clip", [plume.blob(plume.scene, height) for height in heights])
     scene = Scene(clip=filmed.clip).with_frames(3, 4)
-    settings = replace(draft, resolution=(16, 16, 24))
+    settings = replace(smooth, resolution=(16, 16, 24))
     frames_written(scene, settings, tmp_path / "whole")
     goes_on_exactly(scene, settings, tmp_path / "out", 1, tmp_path / "whole")
     (tmp_path / "out").rename(tmp_path / "moved")
@@ -207,18 +207,18 @@ def test_an_estimated_background_resumes_and_moves(plume, draft, tmp_path) -> No
     assert render(sequence.density(2), sequence.scene).shape == (56, 40, 3)
 
 
-def test_frames_that_are_the_background_are_kept_as_its_picture(plume, draft, tmp_path) -> None:
+def test_frames_that_are_the_background_are_kept_as_its_picture(plume, smooth, tmp_path) -> None:
     """The sequence shows it, and goes on with no other frames."""
     clear = np.zeros_like(plume.densities[0])
     scene = plume.write(tmp_path / "clip", [clear, clear, *plume.densities])
     scene = replace(scene, background=Background(frame=0))
-    cut_off(scene, draft, tmp_path / "out", 2)
+    cut_off(scene, smooth, tmp_path / "out", 2)
     sequence = Sequence.open(tmp_path / "out")
     assert sequence.scene.background == Background(image=tmp_path / "out" / "background.exr")
     with Clip.open(scene.clip) as opened:
         np.testing.assert_allclose(read_image(sequence.scene.background.image), opened.frame(0), atol=1e-3)
     with pytest.raises(SequenceError, match=r"sources\.background\.frame\[0\]"):
-        frames_written(replace(scene, background=Background(frame=1)), draft, tmp_path / "out", resume=True)
+        frames_written(replace(scene, background=Background(frame=1)), smooth, tmp_path / "out", resume=True)
 
 
 def centroid(density: np.ndarray, scene: Scene) -> np.ndarray:
@@ -227,12 +227,12 @@ def centroid(density: np.ndarray, scene: Scene) -> np.ndarray:
     return np.array([np.average(place, weights=density) for place in places])
 
 
-def test_further_views_put_the_smoke_in_its_place(plume, two_views, draft, tmp_path) -> None:
+def test_further_views_put_the_smoke_in_its_place(plume, two_views, smooth, tmp_path) -> None:
     """From the front alone the blob stands in the middle of the box; with the side where it stood, in every frame."""
     two_views, voxel = two_views.with_frames(0, 2), two_views.domain.voxel_size
     truth = [centroid(np.roll(density, 5, axis=1), two_views) for density in plume.densities]
-    alone = frames_of(replace(two_views, views=()).with_frames(0, 1), draft)
-    both = frames_written(two_views, draft, tmp_path / "out")
+    alone = frames_of(replace(two_views, views=()).with_frames(0, 1), smooth)
+    both = frames_written(two_views, smooth, tmp_path / "out")
     for frames, near in ((alone, False), (both, True)):
         off = [np.linalg.norm(centroid(f.density, two_views) - truth[f.number - 1]) / voxel for f in frames]
         assert max(off) < 0.7 if near else min(off) > 3
@@ -257,9 +257,9 @@ def test_the_papers_loop_takes_all(coarse) -> None:
     assert all(frame.figures["transport"] == {} for frame in frames)
 
 
-def test_smoke_from_a_moving_camera_stands_where_it_stood(plume, tracked, draft, along_the_path) -> None:
+def test_smoke_from_a_moving_camera_stands_where_it_stood(plume, tracked, smooth, along_the_path) -> None:
     """The pictures are fitted, the smoke is in its place to half a voxel; a still camera's would drift off."""
-    still = frames_of(replace(tracked, camera=tracked.camera.at(0)).with_frames(4, 4), draft)
+    still = frames_of(replace(tracked, camera=tracked.camera.at(0)).with_frames(4, 4), smooth)
 
     def off(frame: Frame, truth: np.ndarray) -> float:
         way = centroid(frame.density, tracked) - centroid(truth, tracked)
@@ -271,15 +271,15 @@ def test_smoke_from_a_moving_camera_stands_where_it_stood(plume, tracked, draft,
             assert psnr(render(frame.density, tracked, tracked.camera.at(index)), clip.frame(index)) >= 40
 
 
-def test_a_moving_camera_resumes_on_its_own_path_only(tracked, draft, along_the_path, tmp_path) -> None:
+def test_a_moving_camera_resumes_on_its_own_path_only(tracked, smooth, along_the_path, tmp_path) -> None:
     """The path is kept with the sequence: the rest is the same to the bit, and another path is refused."""
     out = tmp_path / "out"
-    goes_on_exactly(tracked, draft, out, 3, along_the_path[1])
+    goes_on_exactly(tracked, smooth, out, 3, along_the_path[1])
     assert Sequence.open(out).scene == completed(tracked)
     poses = tracked.camera.matrices
     other = replace(tracked.camera, matrices=(*poses[:-1], poses[0]))
     with pytest.raises(SequenceError, match=r"scene\.camera\.matrices\[4\]\[0\]\[0\]"):
-        frames_written(replace(tracked, camera=other), draft, out, resume=True)
+        frames_written(replace(tracked, camera=other), smooth, out, resume=True)
 
 
 @pytest.mark.parametrize("target", [(0, -9, 0.8), (1.1, 0, 0.8)], ids=["away", "aside"])
@@ -293,7 +293,7 @@ def test_smoke_that_a_moving_camera_loses_goes_on(plume, tracked, draft, tmp_pat
     assert centroid(frames[4].density, tracked)[2] > centroid(frames[3].density, tracked)[2] + 0.02
 
 
-def test_a_clean_plate_for_every_frame(plume, tracked, draft, tmp_path) -> None:
+def test_a_clean_plate_for_every_frame(plume, tracked, smooth, tmp_path) -> None:
     columns, rows = (3 * side for side in tracked.camera.size)
     camera = replace(tracked.camera.resized(columns, rows), matrices=tracked.camera.matrices[:3])
     tracked = replace(tracked, camera=camera)
@@ -306,7 +306,7 @@ def test_a_clean_plate_for_every_frame(plume, tracked, draft, tmp_path) -> None:
         write_image(tmp_path / f"frame_{n}.exr", renderer.image(density))
     clip = ClipSource(tmp_path / "frame_#.exr", fps=24)
     scene = replace(tracked, clip=clip, background=Background(image=tmp_path / "plate_#.exr"))
-    frames = frames_written(scene, draft, tmp_path / "out")
+    frames = frames_written(scene, smooth, tmp_path / "out")
     assert all(frame.figures["psnr"] >= 35 for frame in frames)
     assert all(frame.figures["hull_share"] < 0.5 for frame in frames)
     assert Sequence.open(tmp_path / "out").scene == completed(scene)
@@ -323,7 +323,7 @@ def test_frames_without_smoke_are_empty(plume, draft, tmp_path, detail) -> None:
         assert (frame.figures["hull_share"] > 0) == bool(clip[frame.number - 1].any())
 
 
-def test_every_part_of_a_method_can_be_exchanged(coarse, draft) -> None:
+def test_every_part_of_a_method_can_be_exchanged(coarse, smooth) -> None:
     """The loop asks each part for what it is for: here the temporal prior, which starts every frame alike.
 
     Parts compute on one thread of BLAS.
@@ -337,14 +337,14 @@ def test_every_part_of_a_method_can_be_exchanged(coarse, draft) -> None:
     class Idle:
         def fit(self, views: ViewSet, depth: Any, initial: np.ndarray | None) -> Any:
             threads.append(blas_threads())
-            found = GradientFit(draft.density).fit(views, depth, initial)
+            found = GradientFit(smooth.density).fit(views, depth, initial)
             return found if initial is None else replace(found, density=initial)
 
-    default = compose(draft)
+    default = compose(smooth)
     method = Method(Idle(), default.depth_prior, default.velocity_estimator, Stubborn())
     with threadpool_limits(2, user_api="blas"):
         before = blas_threads()
-        frames = frames_of(coarse, draft, method, count=3)
+        frames = frames_of(coarse, smooth, method, count=3)
         assert blas_threads() == before
     assert all(number == {1} for number in threads)
     assert frames[1].figures["transport"] == {}
@@ -372,19 +372,19 @@ def test_a_frame_that_is_let_go_takes_no_memory(coarse, draft, tmp_path) -> None
     assert alive == [0, 0]
 
 
-def test_fire_is_a_second_grid(plume, draft, tmp_path) -> None:
+def test_fire_is_a_second_grid(plume, smooth, tmp_path) -> None:
     dim = replace(plume.scene, lights=(DirectionalLight((0.3, 0.5, -0.8), (0.6, 0.6, 0.6)),))
     scene = replace(plume.write(tmp_path / "clip", plume.densities[:2], dim), lights=())
     with Clip.open(scene.clip) as clip:
         burnt = clip.changed(burning)
         frames: list[Frame] = []
-        sequence = reconstruct(burnt, scene, draft).write(tmp_path / "out", npz=True, on_frame=frames.append)
+        sequence = reconstruct(burnt, scene, smooth).write(tmp_path / "out", npz=True, on_frame=frames.append)
         for frame in frames:
             np.testing.assert_array_equal(sequence.flame(frame.number), frame.flame)
             fire = burnt.frame(frame.number - 1)[..., 0] > 0.5
             error = np.abs(sequence.render(frame.number) - burnt.frame(frame.number - 1))[fire]
             assert error.mean() < 0.1 * burnt.frame(frame.number - 1)[fire].mean()
-        assert all(part.flame is None for part in reconstruct(clip, scene, draft))
+        assert all(part.flame is None for part in reconstruct(clip, scene, smooth))
     assert any(part["what"] == "emission of fire" for part in sequence.provenance)
 
 

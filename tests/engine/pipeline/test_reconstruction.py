@@ -14,7 +14,7 @@ from smokelift.pipeline import Frame, Reconstruction, compose, reconstruct
 from smokelift.scene import Background, completed
 
 
-def test_nothing_is_computed_before_it_is_wanted(plume, draft, tmp_path) -> None:
+def test_nothing_is_computed_before_it_is_wanted(plume, smooth, tmp_path) -> None:
     computed = []
 
     class Counted:
@@ -23,8 +23,8 @@ def test_nothing_is_computed_before_it_is_wanted(plume, draft, tmp_path) -> None
             return GradientFit().fit(*given)
 
     with Clip.open(plume.scene.clip) as clip:
-        method = replace(compose(draft), density_fit=Counted())
-        run = reconstruct(clip, plume.scene, draft, method=method)
+        method = replace(compose(smooth), density_fit=Counted())
+        run = reconstruct(clip, plume.scene, smooth, method=method)
         assert run.shot.scene == completed(plume.scene)
         assert run.method == method
         (tmp_path / "mine.txt").touch()
@@ -36,11 +36,11 @@ def test_nothing_is_computed_before_it_is_wanted(plume, draft, tmp_path) -> None
         assert len(computed) == 2  # the first has the second's velocity
 
 
-def test_frames_in_memory_and_written_are_the_same(plume, draft, tmp_path) -> None:
+def test_frames_in_memory_and_written_are_the_same(plume, smooth, tmp_path) -> None:
     """Each way computes them anew, and density and velocity have one type in memory and from files."""
     scene = plume.scene.with_frames(0, 1)
     with Clip.open(scene.clip) as clip:
-        run = reconstruct(clip, scene, draft)
+        run = reconstruct(clip, scene, smooth)
         sequence, frames = run.write(tmp_path / "out", npz=True), list(run)
     assert isinstance(sequence, Sequence) and sequence.complete
     assert [frame.number for frame in frames] == [1, 2]
@@ -53,10 +53,10 @@ def test_frames_in_memory_and_written_are_the_same(plume, draft, tmp_path) -> No
         assert (velocity.voxel_size, velocity.closed) == (frame.velocity.voxel_size, frame.velocity.closed)
 
 
-def test_a_run_is_not_resumed_with_other_parts(plume, draft, tmp_path) -> None:
+def test_a_run_is_not_resumed_with_other_parts(plume, smooth, tmp_path) -> None:
     scene = plume.scene.with_frames(0, 0)
     with Clip.open(scene.clip) as clip:
-        usual = reconstruct(clip, scene, draft)
+        usual = reconstruct(clip, scene, smooth)
         other = Reconstruction(usual.shot, replace(usual.method, temporal_prior=NothingCarried()))
         other.write(tmp_path, npz=True)
         assert other.write(tmp_path, npz=True, resume=True).complete
@@ -64,7 +64,7 @@ def test_a_run_is_not_resumed_with_other_parts(plume, draft, tmp_path) -> None:
             usual.write(tmp_path, npz=True, resume=True)
 
 
-def test_a_sequence_renders_to_what_its_fit_was_judged_by(plume, draft, tmp_path) -> None:
+def test_a_sequence_renders_to_what_its_fit_was_judged_by(plume, smooth, tmp_path) -> None:
     """Also before a picture, where the fit is to the extracted element, which stands before one color."""
     wall = np.kron(np.random.default_rng(0).uniform(0.05, 0.3, (28, 20, 3)), np.ones((2, 2, 1)))
     write_image(tmp_path / "wall.exr", wall)
@@ -72,7 +72,7 @@ def test_a_sequence_renders_to_what_its_fit_was_judged_by(plume, draft, tmp_path
     scene = plume.write(tmp_path / "clip", plume.densities[:2], before_wall)
     frames: list[Frame] = []
     with Clip.open(scene.clip) as clip:
-        run = reconstruct(clip, scene, draft)
+        run = reconstruct(clip, scene, smooth)
         sequence = run.write(tmp_path / "out", npz=True, on_frame=frames.append)
         for frame in frames:
             (view,) = ViewSet.of(run.shot.observe(frame.number - 1), run.shot.optics).views

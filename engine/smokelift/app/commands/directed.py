@@ -9,14 +9,18 @@ from smokelift.app.options import add_directed_options, finite_number, frame_ran
 from smokelift.app.progress import Reporter, say_sequence
 from smokelift.checks import Finding
 from smokelift.direct.continuation import CONTRADICTED, DISSOLVED, ROOM, Continuation, continue_sequence
-from smokelift.direct.looping import default_overlap, loop_length, loop_sequence, steady_part
 from smokelift.direct.mesh import Mesh
-from smokelift.direct.new_sequence import Written, open_source
-from smokelift.direct.retiming import playback, retime_sequence
-from smokelift.direct.surroundings import Ball, BoxObstacle, Fan
-from smokelift.direct.turbulence import Turbulence
-from smokelift.output.files import INDEX
-from smokelift.output.index import Index
+from smokelift.direct.retiming import (
+    default_overlap,
+    loop_length,
+    loop_sequence,
+    playback,
+    retime_sequence,
+    steady_part,
+)
+from smokelift.direct.state import Written, open_source
+from smokelift.direct.surroundings import Ball, BoxObstacle, Fan, Turbulence
+from smokelift.output.index import INDEX, Index
 from smokelift.output.sequence import Sequence
 from smokelift.report.cost import affordable_room
 from smokelift.scene import SIDES
@@ -95,7 +99,6 @@ def add_continue_options(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_repeatable(parser: argparse.ArgumentParser, option: str, values: tuple[str, ...], what: str) -> None:
-    """Add an option of some numbers, which may be given again."""
     parser.add_argument(
         option,
         type=finite_number,

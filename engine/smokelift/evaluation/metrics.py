@@ -1,4 +1,9 @@
-"""How far pictures, densities and velocities are from the true ones; and what every metric demands of arrays."""
+"""How near a result is to the truth: pictures, densities, velocities.
+
+Every function refuses with ValueError values that are not finite, since a NaN that slips into a mean is worse than no
+figure; so it does arrays of other shapes than it says, a mask that counts nothing, and a size or a peak that is not
+positive.
+"""
 
 import math
 
@@ -6,21 +11,27 @@ import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
 
-from smokelift.checks import Doubles, Mask, numbers
-from smokelift.transport import StaggeredGrid, require_positive
+from smokelift.checks import Doubles, Mask
+from smokelift.evaluation.statistics import PatchStatistics, RayShapes, finite_array, mean_gradient, relative
+from smokelift.transport import require_positive
+
+__all__ = [
+    "PatchStatistics",
+    "RayShapes",
+    "flicker",
+    "height_mass_error",
+    "mass",
+    "mean_divergence",
+    "mean_gradient",
+    "psnr",
+    "ssim",
+    "velocity_error",
+    "volume_error",
+    "warp_error",
+]
 
 
-def finite_array(values: npt.ArrayLike) -> Doubles:
-    """Return an array of float64; ValueError if it holds anything but finite numbers."""
-    if isinstance(values, StaggeredGrid):
-        raise ValueError("a velocity must be an array of vectors at voxel centers: velocity.centres(), not a Velocity")
-    array = numbers(values, "values", np.float64)
-    if not np.isfinite(array).all():
-        raise ValueError("values must be finite; replace those that are not, or leave their pixels or voxels out")
-    return array
-
-
-def pair(a: npt.ArrayLike, b: npt.ArrayLike) -> tuple[Doubles, Doubles]:
+def _pair(a: npt.ArrayLike, b: npt.ArrayLike) -> tuple[Doubles, Doubles]:
     """Return two arrays of float64; ValueError if a value is not finite, or they are empty or differ in shape."""
     first, second = finite_array(a), finite_array(b)
     if first.shape != second.shape:
@@ -30,7 +41,7 @@ def pair(a: npt.ArrayLike, b: npt.ArrayLike) -> tuple[Doubles, Doubles]:
     return first, second
 
 
-def checked_mask(mask: npt.ArrayLike | None, shape: tuple[int, ...]) -> Mask:
+def _checked_mask(mask: npt.ArrayLike | None, shape: tuple[int, ...]) -> Mask:
     """Return which values count, all without a mask; ValueError if it does not fit the shape or counts none."""
     if mask is None:
         return np.ones(shape, np.bool_)
@@ -38,13 +49,6 @@ def checked_mask(mask: npt.ArrayLike | None, shape: tuple[int, ...]) -> Mask:
     if counts.shape != shape[: counts.ndim] or not counts.any():
         raise ValueError(f"the mask {counts.shape} must fit {shape} and count at least one value")
     return counts
-
-
-def relative(error: float, norm: float) -> float:
-    """Return an error beside a norm: 0 where both are, infinity where only the norm is."""
-    if norm == 0.0:
-        return 0.0 if error == 0.0 else math.inf
-    return error / norm
 
 
 def volume_error(density: npt.ArrayLike, truth: npt.ArrayLike, mask: npt.ArrayLike | None = None) -> float:
@@ -61,8 +65,8 @@ def volume_error(density: npt.ArrayLike, truth: npt.ArrayLike, mask: npt.ArrayLi
     -------
     0 for equal arrays; infinity if only the truth is zero everywhere.
     """
-    found, true = pair(density, truth)
-    counts = checked_mask(mask, found.shape)
+    found, true = _pair(density, truth)
+    counts = _checked_mask(mask, found.shape)
     return relative(float(np.linalg.norm((found - true)[counts])), float(np.linalg.norm(true[counts])))
 
 
@@ -84,7 +88,7 @@ def height_mass_error(density: npt.ArrayLike, truth: npt.ArrayLike) -> float:
     -------
     0 for equal masses in every layer, 1 for no density at all; infinity if only the truth is empty.
     """
-    found, true = pair(density, truth)
+    found, true = _pair(density, truth)
     layers, wanted = found.sum(axis=(0, 1)), true.sum(axis=(0, 1))
     return relative(float(np.abs(layers - wanted).sum()), float(wanted.sum()))
 
@@ -106,9 +110,9 @@ def psnr(a: npt.ArrayLike, b: npt.ArrayLike, mask: npt.ArrayLike | None = None, 
     Decibels; infinity for equal pictures.
     """
     require_positive("peak", peak)
-    first, second = pair(a, b)
+    first, second = _pair(a, b)
     error = (first - second) ** 2
-    mean = float(error[checked_mask(mask, error.shape)].mean())
+    mean = float(error[_checked_mask(mask, error.shape)].mean())
     return math.inf if mean == 0.0 else 10.0 * math.log10(peak**2 / mean)
 
 
@@ -126,7 +130,7 @@ def ssim(a: npt.ArrayLike, b: npt.ArrayLike, peak: float = 1.0) -> float:
         The value of white.
     """
     require_positive("peak", peak)
-    first, second = pair(a, b)
+    first, second = _pair(a, b)
     if first.ndim not in (2, 3) or min(first.shape[:2]) < 11:
         raise ValueError(f"ssim needs pictures of at least 11 x 11 pixels, not of shape {first.shape}")
 
@@ -163,8 +167,8 @@ def velocity_error(
     faster than a millionth of its largest speed; a velocity of zero there has the cosine 0. Without any such
     voxel the cosine is 1.
     """
-    found, true = pair(velocity, truth)
-    counts = checked_mask(mask, found.shape[:-1])
+    found, true = _pair(velocity, truth)
+    counts = _checked_mask(mask, found.shape[:-1])
     u, v = found[counts], true[counts]
     error = relative(float(np.linalg.norm(u - v)), float(np.linalg.norm(v)))
     speed = np.linalg.norm(v, axis=-1)
@@ -202,9 +206,9 @@ def mean_divergence(velocity: npt.ArrayLike, voxel_size: float, mask: npt.ArrayL
         for across in {0, 1, 2} - {axis}:
             slope = (np.delete(slope, 0, across) + np.delete(slope, -1, across)) / 2
         outflow += slope / voxel_size
-    counts = checked_mask(mask, u.shape[:3])
+    counts = _checked_mask(mask, u.shape[:3])
     corners = np.lib.stride_tricks.sliding_window_view(counts, (2, 2, 2)).all(axis=(3, 4, 5))
-    return float(np.abs(outflow)[checked_mask(corners, outflow.shape)].mean())
+    return float(np.abs(outflow)[_checked_mask(corners, outflow.shape)].mean())
 
 
 def warp_error(
@@ -224,7 +228,7 @@ def warp_error(
     mask
         Which voxels count; None counts all.
     """
-    start, end = pair(before, after)
+    start, end = _pair(before, after)
     way = finite_array(displacement)
     if way.shape != (*start.shape, 3):
         raise ValueError(f"the displacement {way.shape} must have a vector for each of {start.shape} voxels")

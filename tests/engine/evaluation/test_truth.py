@@ -6,8 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from smokelift.evaluation.frame_means import eight_bit_values, finite_mean, means, picture_figures, volume_means
-from smokelift.evaluation.truth import Truth, resampled
+from smokelift.evaluation.truth import (
+    Truth,
+    eight_bit_values,
+    finite_mean,
+    means,
+    picture_figures,
+    resampled,
+    volume_means,
+)
 from smokelift.transport import Velocity
 
 SHAPE = (16, 16, 24)

@@ -6,7 +6,7 @@ import numpy as np
 from PIL import Image
 
 from smokelift.checks import Finding
-from smokelift.report.page import COLUMNS, Page, Panel, write_page
+from smokelift.report.inspection import COLUMNS, Page, Panel, write_page
 
 RED = np.zeros((50, 80, 3), np.uint8) + np.uint8([200, 10, 10])
 PAGE = Page(
