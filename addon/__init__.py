@@ -8,20 +8,17 @@ from importlib import import_module
 from types import ModuleType
 
 MODULES = (
-    ("panel", "preferences properties"),
+    ("panel", "properties"),
     ("scene", "volume"),
     ("result", "follow shot_check run_queue side_job export command_line"),
-    ("panel", "clip_panel camera_panel quality_panel run_panel editors tab"),
-    ("panel", "element_panel results_panel advanced_panel look_panel setup_panel direct_panel export_panel"),
+    ("panel", "clip_panel camera_panel quality_panel editors tab"),
+    ("panel", "element_panel results_panel look_panel direct_panel"),
 )
 """Folders and modules with classes or more to register, each after those it needs; panels in the order of the tab."""
 
 
 def register() -> None:
-    """Register all classes, properties and handlers.
-
-    ShotError if the zip is for another Blender, which its preferences show when they enable the add-on.
-    """
+    """Register all of it; ShotError, which Blender's preferences show, if the zip is for another Blender."""
     from .core.job import require_fitting_zip
 
     require_fitting_zip()

@@ -7,7 +7,7 @@
 #include <optional>
 #include <variant>
 
-// Lights are those of light_sweeps.py, read by their attributes.
+// Lights are those of plan.py, read by their attributes.
 namespace pybind11::detail {
 
 template <class T, class... Rest> void read(handle from, const char *name, T &value, Rest &&...rest) {

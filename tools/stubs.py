@@ -30,7 +30,7 @@ import numpy as np
 import numpy.typing as npt
 
 from smokelift.checks import Array, Mask
-from smokelift.render.light_sweeps import ParallelSweep, PointSweep
+from smokelift.render.plan import ParallelSweep, PointSweep
 
 Reals = npt.NDArray[np.floating[Any]]
 Integers = npt.NDArray[np.int32]

@@ -1,8 +1,17 @@
-"""What the add-on repeats of the engine and of tools/, which it may not import.
+"""What the add-on repeats of the engine and of tools/, which it may not import: names, counting pictures, retiming.
 
-`tests/addon/core/test_contract.py` holds every value to the engine's own. The panel's choices and defaults stand in
-the settings, because Blender has to know them without a process; `tests/addon/inside/register.py` holds those.
+`tests/addon/core/test_contract.py` holds all of it to the engine. The panel's choices and defaults stand in the
+settings, because Blender has to know them without a process; `tests/addon/inside/register.py` holds those.
 """
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import pairwise
+from pathlib import Path
+from typing import NamedTuple
 
 DONE, BAD_INPUT, CANCELLED = 0, 2, 130  # exit statuses of the command line; 3 is a missing device or too little memory
 INDEX_FILE = "sequence.json"  # file in a sequence's directory with scene, settings and finished frames
@@ -51,3 +60,76 @@ BLENDERS = {"3.11": "blender4.2-5.0", "3.13": "blender5.1"}  # in a zip's name, 
 
 PLATFORMS = {("linux", "x86_64"): "linux-x64", ("win32", "amd64"): "windows-x64", ("darwin", "arm64"): "macos-arm64"}
 """Blender's platforms that there are zips for, by Python's names of system and processor."""
+
+LISTED = 3  # names of missing pictures that are listed
+
+
+@dataclass(frozen=True)
+class ImageSequence:
+    """A sequence of numbered pictures as the engine counts them; Blender ends it at its first gap."""
+
+    count: int  # from the first to the last, with those that are missing in between
+    missing: tuple[str, ...]  # names of these
+
+    def missing_names(self) -> str:
+        """The first names of those that are missing, and how many there are more."""
+        listed = ", ".join(self.missing[:LISTED])
+        more = len(self.missing) - LISTED
+        return f"{listed} and {more} more" if more > 0 else listed
+
+
+def image_sequence_from(first: Path) -> ImageSequence | None:
+    """The sequence that begins with a numbered picture; None where there is none, or most of it is missing."""
+    try:
+        return _image_sequence_at(first, first.parent.stat().st_mtime_ns)
+    except OSError:
+        return None
+
+
+@lru_cache(16)  # sequences: the panel asks with every redraw
+def _image_sequence_at(first: Path, _time_of_folder: int) -> ImageSequence | None:
+    named = re.fullmatch(r"(.*?)(\d+)(\.[^.]+)", first.name)
+    if named is None or named[1].endswith("-"):
+        return None
+    prefix, number, suffix = named.groups()
+    digits = len(number)
+    name = re.compile(re.escape(prefix) + rf"(\d{{{digits},}})" + re.escape(suffix))
+    found = {int(match[1]) for file in first.parent.iterdir() if (match := name.fullmatch(file.name))}
+    found = {n for n in found if n >= int(number)}
+    missing = sorted(set(range(int(number), max(found, default=0))) - found)
+    if int(number) not in found or len(missing) > len(found):
+        return None
+    return ImageSequence(len(found) + len(missing), tuple(f"{prefix}{n:0{digits}d}{suffix}" for n in missing))
+
+
+class Retiming(NamedTuple):
+    """How a take is passed through: its place, from 0, and its speed are expressions for drivers."""
+
+    place: str
+    speed: str
+    duration: float  # until the last frame has been shown for its time, in frames
+
+
+def retiming(count: int, speeds: Sequence[float], time: str) -> Retiming:
+    """The pace of a take of so many frames, with one speed or more, by an expression for the time in frames.
+
+    Speeds lie evenly from the first frame to the last and change linearly in between, as in the engine's ``retime``.
+    Where the speed goes from s0 by k for each frame, the place after a time t is s0 (exp(k t) - 1) / k.
+    """
+    length, begin, ramps = (count - 1) / max(1, len(speeds) - 1), 0.0, []
+    for number, (before, after) in enumerate(pairwise(speeds if len(speeds) > 1 else (*speeds, *speeds))):
+        first, since = f"{number * length:.9g}", f"({time}-{begin:.9g})"
+        if length == 0.0 or math.isclose(before, after, rel_tol=1e-6):
+            place, speed = f"{first}+{before:.9g}*{since}", f"{before:.9g}"
+            begin += length / before
+        else:
+            change = (after - before) / length
+            growth = f"exp({change:.9g}*{since})"
+            place, speed = f"{first}+{before / change:.9g}*({growth}-1)", f"{before:.9g}*{growth}"
+            begin += math.log(after / before) / change
+        ramps.append((place, speed, begin))
+    *earlier, (place, speed, _) = ramps
+    for place_before, speed_before, end in reversed(earlier):
+        place = f"({place_before} if {time}<{end:.9g} else {place})"
+        speed = f"({speed_before} if {time}<{end:.9g} else {speed})"
+    return Retiming(place, speed, begin + 1 / speeds[-1])

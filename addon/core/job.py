@@ -65,10 +65,7 @@ def engine_command(arguments: Sequence[str]) -> list[str]:
 
 
 def require_fitting_zip() -> None:
-    """Refuse the engine of a zip for another Python or another platform, which Blender installs without a word.
-
-    The ShotError names the zip that fits.
-    """
+    """Refuse a zip for another Python or platform, which Blender installs silently; ShotError names the right one."""
     pythons = sorted(folder.name.removeprefix("python") for folder in HOME.glob("python3.*"))
     manifest = {}
     with suppress(OSError, ValueError):  # it runs without being installed

@@ -43,35 +43,28 @@ _NAME = re.compile(r"take_(\d{4,})")
 
 @dataclass(frozen=True)
 class Take:
-    """One run's files; ``directory`` holds its sequence."""
+    """One run's files, as above; ``directory`` holds its sequence."""
 
     directory: Path
 
     @property
     def scene_file(self) -> Path:
-        """The scene file."""
         return self.directory.with_suffix(".toml")
 
     @property
     def request_file(self) -> Path:
-        """The engine's further options."""
         return self.directory.with_suffix(".json")
 
     @property
     def log_file(self) -> Path:
-        """The engine's messages."""
         return self.directory.with_suffix(".log")
 
     @property
     def thumbnail_file(self) -> Path:
-        """The thumbnail of the last frame."""
         return self.directory.with_suffix(".png")
 
     def copy_mask(self, drawn: Path) -> str:
-        """Copy the mask that was drawn for it, so that another does not change it; returns what its scene file has.
-
-        It is a picture ``mask.png``, or the pattern ``mask_####.png`` of numbered ones. ShotError if that fails.
-        """
+        """Copy its drawn mask, a picture or a pattern; returns what its scene file has. ShotError if that fails."""
         files = drawn.parent.glob(drawn.name.replace("####", "*"))
         self._write({Path(f"{self.directory}_{file.name}"): file.read_bytes() for file in files})
         return f"{self.directory.name}_{drawn.name}"
@@ -129,10 +122,7 @@ class Take:
         return file.is_file() or ("#" in file.name and any(file.parent.glob(re.sub("#+", "[0-9]*", file.name))))
 
     def arguments(self) -> list[str]:
-        """The engine's arguments, which start this take or resume it.
-
-        ShotError if its files are missing or damaged, or hold an option that does not decide its result.
-        """
+        """The engine's arguments, which start or resume it; ShotError if files are damaged, or hold other options."""
         now = self.read()
         direction, source, options = now.direction, now.source, now.options
         if options is None:
@@ -198,34 +188,17 @@ class Snapshot:
     options: list[str] | None  # the engine's further options; None where the request is missing or damaged
     title: str  # the name that the artist gave it, or its number
     index: dict[str, Any]  # `sequence.json`, not to be changed; empty before there is one, or of a foreign one
+    scene: Any  # the tables of its scene as the engine completed them; None without an index
     numbers: list[int]  # those of the finished frames
-    begun: bool  # whether it has what a run needs
+    file_numbers: list[int]  # those in the names of their files; the engine of earlier versions counts from 1
+    complete: bool  # whether all frames are finished
+    resumable: bool  # whether the run can go on: it started and is not complete
     files: frozenset[Path] | None  # .blend files, without links, that may show it; None where a list was never kept
 
     @property
     def frames(self) -> int:
         """Number of finished frames."""
         return len(self.numbers)
-
-    @property
-    def file_numbers(self) -> list[int]:
-        """The numbers in the names of their files; the engine of earlier versions counts from 1."""
-        return [number + self.index.get("start_number", 1) - 1 for number in self.numbers]
-
-    @property
-    def scene(self) -> Any:
-        """The tables of its scene as the engine completed them, where there is an index."""
-        return self.index["scene"]
-
-    @property
-    def complete(self) -> bool:
-        """Whether all frames are finished."""
-        return bool(self.index.get("complete"))
-
-    @property
-    def resumable(self) -> bool:
-        """Whether the run can go on: it started and is not complete."""
-        return self.begun and not self.complete
 
 
 FileState = tuple[int, int, int] | None  # time, number and size, by which a change is seen; None of a missing file
@@ -253,16 +226,20 @@ def _snapshot_at(take: Take, request_state: FileState, _index_state: FileState, 
     source = Take(Path(os.path.normpath(folder / there))) if isinstance(there, str) else None
     if not isinstance(options, list) or ("direction" in request and (direction is None or source is None)):
         options = None
-    number = take.directory.name.rpartition("_")[2].lstrip("0")
-    files = request.get("files")
+    begun = request_state is not None and (direction is not None or scene_state is not None)
+    number, files = take.directory.name.rpartition("_")[2].lstrip("0"), request.get("files")
+    numbers, complete = sorted(map(int, index.get("frames", ()))), bool(index.get("complete"))
     return Snapshot(
         direction=direction,
         source=source,
         options=None if options is None else [str(word) for word in options],
         title=str(request.get("title", "")) or f"{TITLES.get(direction or '', 'Take')} {number}",
         index=index,
-        numbers=sorted(map(int, index["frames"])) if index else [],
-        begun=request_state is not None and (direction is not None or scene_state is not None),
+        scene=index.get("scene"),
+        numbers=numbers,
+        file_numbers=[number + index.get("start_number", 1) - 1 for number in numbers],
+        complete=complete,
+        resumable=begun and not complete,
         files=frozenset((folder / str(file)).resolve() for file in files) if isinstance(files, list) else None,
     )
 

@@ -1,12 +1,11 @@
 """Camera, box and light in the tab; and the button that asks where the smoke stands."""
 
 import bpy
-from bpy.app.translations import pgettext_rpt as rpt_
 from bpy_extras import view3d_utils
 
 from ..core import ShotError
-from ..scene.box import box_of, framed_box, has_inlet, new_box
-from ..scene.floor import Floor
+from ..scene.blender import rpt_
+from ..scene.geometry import Floor, box_of, framed_box, has_inlet, new_box
 from ..scene.plate import show_clip_behind
 from ..scene.smoke import active_smoke, scene_of
 from .clip_panel import draw_mask, draw_picture
@@ -157,7 +156,7 @@ class SMOKELIFT_OT_place(Needing, bpy.types.Operator):
         return outcome
 
 
-def draw_shot(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
+def draw_shot(layout: bpy.types.UILayout, smoke: bpy.types.Object) -> None:
     settings = smoke.smokelift
     row = layout.row(align=True)
     row.prop(settings, "plate_mode")

@@ -4,14 +4,12 @@ import os
 from contextlib import suppress
 
 import bpy
-from bpy.app.translations import pgettext_iface as iface_
-from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..core import ShotError
 from ..result import smoke_takes
 from ..result.shot_check import state
 from ..scene import shot_setup
-from ..scene.blender import absolute, file_of, frame_rate, relative
+from ..scene.blender import absolute, file_of, frame_rate, iface_, relative, rpt_
 from ..scene.clip import frame_count, shown_frame, unseen_pictures, used_range
 from ..scene.pictures import is_distorted, undistorted
 from ..scene.smoke import active_smoke, free_folder, new_smoke

@@ -1,10 +1,10 @@
-"""What operators, panels and settings share: when they can be used, and how operators say what is in the way."""
+"""How operators and panels are declared, when they can be used, and how operators say what is in the way."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import bpy
-from bpy.props import BoolProperty, StringProperty
+from bpy import props
 
 from ..core import ShotError
 from ..result.side_job import writing_job
@@ -13,9 +13,9 @@ from ..scene.smoke import active_smoke
 
 EDITORS = {"view": "VIEW_3D", "clip": "CLIP_EDITOR"}  # the editors that have the tab in their sidebar
 UNDO = {"REGISTER", "UNDO"}  # options of an operator that can be undone, and adjusted
-FILE = StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})  # what a file browser gives its operator
-FOLDER = StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE"})
-HIDDEN = StringProperty(options={"SKIP_SAVE", "HIDDEN"})  # a text that a button gives its operator
+FILE = props.StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})  # what a file browser gives its operator
+FOLDER = props.StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE"})
+HIDDEN = props.StringProperty(options={"SKIP_SAVE", "HIDDEN"})  # a text that a button gives its operator
 
 Act = Callable[..., str | None]
 """Does something in a context with the active smoke; ShotError if something is in the way. What it returns is said."""
@@ -35,10 +35,7 @@ needs_rest = Need("Other files are being written: wait for them, or cancel that"
 
 
 class Needing:
-    """What Blender offers only where nothing that it needs is missing; the first that is says so.
-
-    Its identifier is that of its class.
-    """
+    """What Blender offers only where nothing that it needs is missing; the first that is says so."""
 
     needs: Sequence[Need] = ()
 
@@ -86,7 +83,7 @@ def operator(
 class OpensBrowser(Needing):
     """One that asks for a folder, or a file."""
 
-    filter_folder: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
+    filter_folder: props.BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         context.window_manager.fileselect_add(self)
@@ -96,19 +93,18 @@ class OpensBrowser(Needing):
 class ChoosesFile(OpensBrowser):
     """One that asks for a picture or a video."""
 
-    filter_movie: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
-    filter_image: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
+    filter_movie: props.BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
+    filter_image: props.BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
 
 
 Draw = Callable[[bpy.types.UILayout, bpy.types.Context, bpy.types.Object], None]  # draws the tab or a part of it
 
 
 def panels(name: str, label: str, *needs: Need, **attributes: Any) -> Callable[[Draw], tuple[type, ...]]:
-    """Make of what draws it a panel of the tab in both editors, whose classes have further attributes.
+    """Make of what draws it a panel of the tab in both editors, SMOKELIFT_PT_view_NAME and SMOKELIFT_PT_clip_NAME.
 
-    Blender knows them as SMOKELIFT_PT_view_NAME and SMOKELIFT_PT_clip_NAME. Without a name it is the tab itself,
-    with one a part of it, closed at first. Names of settings are drawn on their left. It is shown where nothing is
-    missing that it needs.
+    Without a name it is the tab itself, with one a part of it, closed at first, and shown where nothing that it needs
+    is missing. Names of settings are drawn on their left. Its classes have further attributes.
     """
 
     def made(draw: Draw) -> tuple[type, ...]:
@@ -128,8 +124,3 @@ def panels(name: str, label: str, *needs: Need, **attributes: Any) -> Callable[[
         return tuple(classes)
 
     return made
-
-
-def speed_changed(_settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
-    """Play at the new speed."""
-    volume.synchronize_playback()

@@ -1,17 +1,22 @@
-"""The sub-panel Direct: what is made of the result on show, and the button that does it."""
+"""The sub-panels Direct and Export: what is made of the result on show, and how that is handed on."""
 
 from typing import Any
 
 import bpy
-from bpy.app.translations import pgettext_iface as iface_
 
 from ..core.contract import FASTEST, SLOWEST
 from ..result import run_queue, smoke_takes
 from ..result.directing import MESHES, frames_of_result
+from ..result.export import arguments, copy_of, export_size, folder_of, write_asset
+from ..result.side_job import write_files, writing_job
+from ..scene import volume
+from ..scene.blender import PATH_OPTIONS, iface_
 from ..scene.modifiers import CAN_INTERPOLATE
-from .common import UNDO, Need, needs_clip, needs_result, operator, panels, speed_changed
-from .layout import draw_automatic, draw_closed, draw_progress, draw_settings, draw_ticked
-from .settings import automatic_unless, choice, closed_sides, link, number, tick, whole
+from ..scene.smoke import activate
+from ..scene.volume import synchronize_playback
+from .common import UNDO, Need, needs_clip, needs_rest, needs_result, needs_smoke, operator, panels
+from .layout import draw_automatic, draw_closed, draw_progress, draw_settings, draw_text, draw_ticked, draw_work
+from .settings import automatic_unless, choice, closed_sides, link, number, string, tick, whole
 
 LINES = 11  # of the longest direction: the others are as high, or buttons would move under the pointer
 EFFECTORS = "Effectors"  # name of a collection that the tab makes
@@ -34,7 +39,7 @@ def _part_chosen(settings: bpy.types.PropertyGroup, _context: bpy.types.Context)
 def _speed(name: str, description: str, default: float) -> Any:
     """A speed, of which 1 is the clip's own."""
     limits = {"min": SLOWEST, "max": FASTEST, "soft_max": 4.0}
-    return number(name, default=default, update=speed_changed, **limits)(description)
+    return number(name, default=default, update=synchronize_playback, **limits)(description)
 
 
 class DirectSettings:
@@ -74,10 +79,12 @@ class DirectSettings:
         "Velocity of the air in Empties that have no force field"
     )
     speed: _speed("Speed", "Speed of the smoke: 0.5 is half as fast", 0.5)
-    use_ramp: tick("Ramp", update=speed_changed)("Change the speed from the first frame to the middle and to the last")
+    use_ramp: tick("Ramp", update=synchronize_playback)(
+        "Change the speed from the first frame to the middle and to the last"
+    )
     speed_middle: _speed("Middle", "Speed in the middle of the result", 0.5)
     speed_end: _speed("End", "Speed at the last frame", 1.0)
-    live: tick("Preview", update=speed_changed)(
+    live: tick("Preview", update=synchronize_playback)(
         "Play the result on show at this speed now. Retime Smoke, or Frames Between in Advanced, makes the frames in "
         "between"
     )
@@ -159,3 +166,88 @@ def _draw_direct(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: 
     run = run_queue.running()
     if run is not None and run.smoke == smoke.session_uid:
         draw_progress(layout, run.job, "smokelift.cancel").take = str(run.take.directory)
+
+
+class ExportSettings:
+    """What is exported of a smoke."""
+
+    folder: string("Folder", subtype="DIR_PATH", options=PATH_OPTIONS)(
+        "Folder for the export; by default export_ and the program's name, beside the results"
+    )
+    host: choice("For")(
+        "Program that reads the files",
+        ("blender", "Blender", "And other programs with Z up: grids density and velocity"),
+        ("houdini", "Houdini", "Y up, grids density and vel"),
+        ("unreal", "Unreal", "Densities from 0 to 1 for 8 bits, and a pivot that stays in place"),
+    )
+    precision: choice("Precision")(
+        "Bits of each value. Smoke too thin to be seen is left out either way",
+        ("half", "Half", "Floats of 16 bits"),
+        ("quantized", "Quantized", "As few bits as a picture of 8 bits needs: half the size"),
+    )
+    use_velocity: tick("Velocity", default=True)("Export the velocity, which motion blur needs")
+    proxy: choice("Proxy")(
+        "Second, coarser sequence for the viewports of those who get the export",
+        ("1", "None", "No proxy"),
+        ("2", "1/2", "Half the resolution, an eighth of the voxels"),
+        ("4", "1/4", "A quarter of the resolution"),
+    )
+
+
+@operator("Export Smoke", needs_rest, needs_result)
+def export(_context: bpy.types.Context, smoke: bpy.types.Object) -> None:
+    """Write small OpenVDB files of the smoke, a USD file of them, and for Blender an asset to be used in other files"""
+
+    def add_asset(smoke: bpy.types.Object) -> None:
+        if smoke.smokelift_export.host == "blender":
+            write_asset(smoke, folder_of(smoke))
+
+    write_files(smoke, "smokelift.export", arguments(smoke), add_asset)
+
+
+@operator("Make Proxy", needs_rest, needs_result)
+def make_proxy(_context: bpy.types.Context, smoke: bpy.types.Object) -> None:
+    """Write coarse copies of the smoke's files, which viewports show in their place. Renders use the smoke itself"""
+
+    def show_proxy(smoke: bpy.types.Object) -> None:
+        volume.show(smoke, volume.shown_take(smoke))
+
+    write_files(smoke, "smokelift.make_proxy", ["proxy", str(volume.shown_take(smoke).directory)], show_proxy)
+
+
+@operator("Stop Writing", needs_smoke, bl_options={"INTERNAL"})
+def stop_writing(_context: bpy.types.Context, _smoke: bpy.types.Object) -> None:
+    """Stop writing these files"""
+    writing_job.stop()
+
+
+@panels("export", "Export", needs_result)
+def _draw_export(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
+    settings = smoke.smokelift_export
+    layout.prop(settings, "folder", placeholder=str(folder_of(smoke)))
+    draw_settings(layout, settings, "host", "precision", "use_velocity", "proxy")
+    draw_text(layout, export_size(smoke), "DISK_DRIVE")
+    draw_work(layout, smoke, "smokelift.export", "EXPORT")
+    layout.operator("smokelift.add_instance", icon="DUPLICATE")
+
+
+_needs_sequence = Need(
+    "Select a Volume that plays a sequence",
+    lambda context, _: context.object and context.object.type == "VOLUME" and context.object.data.is_sequence,
+)
+_needs_no_driver = Need(
+    "Set Speed to Frame by Frame first",
+    lambda context, _: not (context.object.data.animation_data and context.object.data.animation_data.drivers),
+)
+IN_TIME = {
+    "offset": whole("Time Offset", default=12)("Frames by which the new object plays later; below 0 earlier"),
+    "repeat": tick("Repeat")("Play the frames again and again, as for a loop"),
+}
+
+
+@operator("Instance in Time", _needs_sequence, _needs_no_driver, bl_options=UNDO, given=IN_TIME)
+def add_instance(context: bpy.types.Context, _smoke: bpy.types.Object | None, offset: int, repeat: bool) -> None:
+    """Add another object that plays the active Volume's files later or earlier. The material is shared"""
+    instance = copy_of(context.object, offset, repeat)
+    context.collection.objects.link(instance)
+    activate(instance, context.scene)

@@ -5,11 +5,11 @@ import time
 from pathlib import Path
 
 import bpy
-from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..core import ShotError
 from ..core.take import Take
 from ..result.shot_check import state
+from ..scene.blender import rpt_
 from .common import HIDDEN, Need, needs_clip, needs_smoke, operator
 
 DRAWN_SECONDS = 0.3  # after which a new window has been drawn

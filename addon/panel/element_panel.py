@@ -7,17 +7,16 @@ painted in the Image Editor, whose sidebar has their colors.
 from pathlib import Path
 
 import bpy
-from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..core import ShotError
 from ..core.take import Take
 from ..result import smoke_takes
 from ..result.side_job import write_files
-from ..scene.clip import number_in_file, shown_frame
+from ..scene.blender import rpt_
+from ..scene.clip import lay_below, number_in_file, saved_strokes, shown_frame, strokes_at
 from ..scene.pictures import write_pictures
 from ..scene.scene_file import footage_tables
 from ..scene.smoke import active_smoke
-from ..scene.strokes import lay_below, saved_strokes, strokes_at
 from .common import FOLDER, UNDO, OpensBrowser, needs_clip, needs_rest, operator, panels
 from .editors import show_image
 from .layout import draw_text, draw_work

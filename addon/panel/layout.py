@@ -5,12 +5,12 @@ from collections.abc import Iterable
 from typing import Any
 
 import bpy
-from bpy.app.translations import pgettext_iface as iface_
 
 from ..core.contract import MOVING_CAMERA
 from ..core.job import Job
 from ..core.sentences import REMEDIES, advice, duration, repeats
 from ..result.side_job import writing_job
+from ..scene.blender import iface_
 
 POINTS_PER_LETTER = 6.5  # mean width of a letter in Blender's interface font at scale 1; Blender does not wrap labels
 NEW_WIDTH = 258  # points of the sidebar in a new window; those of a sidebar that is not drawn
@@ -59,10 +59,9 @@ def draw_progress(layout: bpy.types.UILayout, work: Job, operator: str) -> bpy.t
 def draw_doubts(
     layout: bpy.types.UILayout, smoke: bpy.types.Object, doubts: Iterable[tuple[str, str]], said: set[str]
 ) -> None:
-    """Why a result may be wrong, what is left to do about it, and the button that does it.
+    """Why a result may be wrong (kinds and words), what is left to do about it, and the button that does it.
 
-    A doubt is a kind and words. Kinds that are ``said`` elsewhere in the tab are left out, and these are added to
-    them.
+    Kinds that are ``said`` elsewhere in the tab are left out, and these are added to them.
     """
     settings = smoke.smokelift
     given = {

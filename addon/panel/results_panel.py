@@ -3,8 +3,6 @@
 from pathlib import Path
 
 import bpy
-from bpy.app.translations import pgettext_iface as iface_
-from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import StringProperty
 
 from ..core import ShotError
@@ -13,7 +11,7 @@ from ..core.take import Take
 from ..result import smoke_takes
 from ..result.smoke_takes import consequences, directories_in_use, earlier_takes
 from ..scene import volume
-from ..scene.blender import absolute, redraw
+from ..scene.blender import absolute, iface_, redraw, rpt_
 from .common import FOLDER, HIDDEN, UNDO, OpensBrowser, needs_clip, needs_result, needs_smoke, operator, panels
 from .layout import draw_text
 

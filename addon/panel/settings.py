@@ -32,10 +32,7 @@ def link(name: str, kind: type, **options: Any) -> Declared:
 
 
 def automatic_unless(name: str, label: str, start: float | Callable[[Any], float]) -> Any:
-    """A tick for a number that is chosen automatically where it is 0; ticked, the number begins with ``start``.
-
-    It keeps nothing of its own, so it cannot contradict the number.
-    """
+    """A tick for a number that is automatic where it is 0 and begins with ``start``; it keeps nothing of its own."""
     return tick(
         label,
         get=lambda settings: getattr(settings, name) > 0,

@@ -19,9 +19,8 @@ import bpy
 
 from ..core import ShotError
 from ..core.contract import BAD_INPUT, CANCELLED, DONE
-from ..core.job import Job, engine_command
+from ..core.job import Job
 from ..scene import volume
-from ..scene.blender import thread_options
 from ..scene.clip import number_in_file, unseen_pictures, use_frames
 from ..scene.shot_setup import has_denoiser
 from ..scene.smoke import activate, active_smoke, new_smoke, smokes
@@ -50,9 +49,7 @@ def main(words: Sequence[str]) -> int:
         if take is not None:
             smoke_takes.update_moved_files(smoke, take)
         take = take or smoke_takes.write_take(smoke)
-        before = volume.frames_before(smoke, take)
-        words = engine_command(take.arguments() + thread_options())
-        job = Job(words, take.log_file, before, take.read().frames)
+        job = smoke_takes.engine_job(smoke, take)
     except ShotError as error:
         print(f"smokelift: {error}", file=sys.stderr, flush=True)
         return BAD_INPUT

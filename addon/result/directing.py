@@ -83,7 +83,6 @@ def _number_in_take(smoke: bpy.types.Object, frame: int) -> int:
 
 
 def _air_options(smoke: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> list[str]:
-    """Options for wind, turbulence and fans."""
     settings = smoke.smokelift.directing
     to_smoke = _world_to_smoke(smoke.evaluated_get(depsgraph))
     scale = abs(to_smoke.to_3x3().determinant()) ** (1 / 3)
@@ -141,15 +140,13 @@ def _obstacles(smoke: bpy.types.Object, depsgraph: bpy.types.Depsgraph, later: l
 
 
 def _effectors(smoke: bpy.types.Object) -> list[bpy.types.Object]:
-    """The objects that act on a smoke."""
     collection, own = smoke.smokelift.directing.effectors, (smoke, smoke.smokelift.box)
     return [obj for obj in collection.all_objects if obj not in own and not obj.hide_viewport] if collection else []
 
 
 def _kind(obj: bpy.types.Object) -> str:
     """The force field of an object, or NONE."""
-    kind: str = "NONE" if obj.field is None else obj.field.type
-    return kind
+    return "NONE" if obj.field is None else obj.field.type
 
 
 def _world_to_smoke(smoke: bpy.types.Object) -> Matrix:

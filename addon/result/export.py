@@ -10,52 +10,48 @@ from pathlib import Path
 from typing import Any
 
 import bpy
-from bpy.app.translations import pgettext_iface as iface_
 
 from ..core import ShotError
 from ..core.contract import ASSET_FILE, EXPORT_FILE, FRAME_FILE
 from ..core.job import Job
 from ..core.sentences import disk_size
 from ..scene import volume
-from ..scene.blender import absolute, call_later, file_of, relative
+from ..scene.blender import absolute, call_later, file_of, iface_, relative
 from ..scene.look import fit_look
 from ..scene.smoke import find_smoke
 from . import smoke_takes
 from .side_job import REST_SECONDS, writing_job
 
+_size: dict[tuple[Any, ...], str] = {}
+"""The size in words of the next export, by the number of its smoke and what else decides it; never saved."""
 
-class SizeEstimate:
-    """The size of the next export of a smoke; never saved."""
 
-    def __init__(self) -> None:
-        self._of: tuple[Any, ...] = (0,)  # number of the smoke, and what else decides the size
-        self._size = ""
-        self._timer = self._start  # Blender knows a timer by the object, and each `self._start` is another
+def export_size(smoke: bpy.types.Object) -> str:
+    """The size in words; empty until the engine has said it, which is asked once. Drawing code may call this."""
+    now = (smoke.session_uid, *arguments(smoke), volume.shown_take(smoke).read().frames)
+    if now not in _size and not writing_job.writing:
+        _size.clear()
+        _size[now] = ""
+        call_later(_ask_size, REST_SECONDS)
+    return _size.get(now, "")
 
-    def size(self, smoke: bpy.types.Object) -> str:
-        """The size in words; empty until the engine has said it, which is asked once. Drawing code may call this."""
-        now = (smoke.session_uid, *arguments(smoke), volume.shown_take(smoke).read().frames)
-        if self._of != now and not writing_job.writing:
-            self._of, self._size = now, ""
-            call_later(self._timer, REST_SECONDS)
-        return self._size if self._of == now else ""
 
-    def _start(self) -> None:
-        """Ask the engine once the settings rest."""
-        smoke = find_smoke(self._of[0])
-        if smoke is None or writing_job.writing or volume.shown_take(smoke) is None:
-            return
-        try:
-            writing_job.start(smoke, [*arguments(smoke), "--size"], self._store)
-        except ShotError as error:
-            self._size = str(error)
+def _ask_size() -> None:
+    """Ask the engine once the settings rest."""
+    (asked,) = _size
+    smoke = find_smoke(asked[0])
+    if smoke is None or writing_job.writing or volume.shown_take(smoke) is None:
+        return
 
-    def _store(self, _smoke: bpy.types.Object, job: Job) -> None:
+    def store(_smoke: bpy.types.Object, job: Job) -> None:
         done = job.outcome == "done"
-        self._size = iface_("About {:s}").format(disk_size(job.details["size"] / 1e6)) if done else job.sentence
+        if asked in _size:  # else the settings have changed meanwhile
+            _size[asked] = iface_("About {:s}").format(disk_size(job.details["size"] / 1e6)) if done else job.sentence
 
-
-size_estimate = SizeEstimate()
+    try:
+        writing_job.start(smoke, [*arguments(smoke), "--size"], store)
+    except ShotError as error:
+        _size[asked] = str(error)
 
 
 def folder_of(smoke: bpy.types.Object) -> Path:
@@ -81,7 +77,7 @@ def write_asset(smoke: bpy.types.Object, folder: Path) -> None:
     # as it is when the asset is used; nothing of this file but its material goes with it
     copy.location = (0.0, 0.0, 0.0)
     copy.asset_mark()
-    copy.asset_data.description = volume.provenance_note(smoke)
+    copy.asset_data.description = smoke.data.get(volume.PROVENANCE, "")
     try:
         bpy.data.libraries.write(str(folder / ASSET_FILE), {copy}, path_remap="RELATIVE_ALL", compress=True)
     finally:
@@ -89,10 +85,7 @@ def write_asset(smoke: bpy.types.Object, folder: Path) -> None:
 
 
 def copy_of(obj: bpy.types.Object, offset: int = 0, repeat: bool = False) -> bpy.types.Object:
-    """A copy of a Volume object, with data of its own and the same material, which is no smoke to be made.
-
-    It plays some frames later, and again and again if it repeats or the original does.
-    """
+    """A copy of a Volume object, no smoke itself, which plays some frames later, and again and again if it repeats."""
     copy = bpy.data.objects.new(obj.name, obj.data.copy())
     copy.delta_location = obj.delta_location  # first: the matrix has it, and gives the rest to the location
     copy.matrix_basis = obj.matrix_basis

@@ -7,32 +7,29 @@ import bpy.utils.previews
 from bpy.props import BoolProperty, StringProperty
 
 from ..core import ShotError
-from ..core.job import Job, engine_command
 from ..core.take import Take
 from ..scene import volume
-from ..scene.blender import call_later, cancel_call, redraw, thread_options
+from ..scene.blender import call_later, cancel_call, redraw
 from ..scene.smoke import active_smoke, find_smoke, scene_of
 from . import shot_check
 from .side_job import TICK_SECONDS
-from .smoke_takes import Run, runs, show_while_made
+from .smoke_takes import Run, engine_job, runs, show_while_made
 
 
 def enqueue(smoke: bpy.types.Object, take: Take, settings: str = "") -> None:
     """Append a take to the queue; without a window, wait for its end. ShotError if it cannot be made.
 
-    The settings are those that it is made with, as `shot_check.settings_text` has them; empty if they are not the
-    smoke's own.
+    It is made with settings as `shot_check.settings_text` has them; empty if they are not the smoke's own.
     """
     try:
-        words = engine_command(take.arguments() + thread_options())
+        job = engine_job(smoke, take)
     except ShotError:
         take.remove_unless_begun()
         raise
     shot_check.make_way()
-    done, uid = take.read().frames, smoke.session_uid
-    job = Job(words, take.log_file, volume.frames_before(smoke, take), done)
+    uid = smoke.session_uid
     runs[:] = [run for run in runs if run.smoke != uid or not run.job.ended]
-    runs.append(Run(take, uid, job, (done, False), settings))
+    runs.append(Run(take, uid, job, (job.done, False), settings))
     work()
 
 

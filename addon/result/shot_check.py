@@ -12,13 +12,12 @@ from pathlib import Path
 from typing import Any
 
 import bpy
-from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..core import ShotError
 from ..core.job import Job
 from ..core.take import Take
-from ..scene.blender import call_later, cancel_call, redraw, thread_options
-from ..scene.box import box_corners, box_of
+from ..scene.blender import call_later, cancel_call, redraw, rpt_, thread_options
+from ..scene.geometry import box_corners, box_of
 from ..scene.scene_file import options, shot_files, shot_tables
 from ..scene.smoke import active_smoke, find_smoke, scene_of, smokes
 from .side_job import REST_SECONDS, SideJob
@@ -192,7 +191,6 @@ def _start(smoke: bpy.types.Object, needs_page: bool) -> None:
 
 
 def _page(shot: str) -> Path:
-    """The picture of what was found in a shot, by its fingerprint."""
     return Path(bpy.app.tempdir) / f"smokelift_inspect_{shot}.png"
 
 

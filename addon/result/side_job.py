@@ -89,11 +89,10 @@ writing_job = SideJob()  # writes files, or estimates how large they will be
 def write_files(
     smoke: bpy.types.Object, operator: str, words: list[str], complete: Callable[[bpy.types.Object], str | None]
 ) -> None:
-    """Have the engine write files of a smoke, by its arguments; without a window, wait for them.
+    """Have the engine write files of a smoke, by its arguments, for an operator; without a window, wait for them.
 
-    An operator of that identifier asks for them. When they are written, ``complete`` is called with the smoke, and
-    may return what is said of them in place of the engine's words. ShotError if there is no engine, or, without a
-    window, if it failed.
+    Then ``complete`` is called with the smoke, and may return what is said in place of the engine's words. ShotError
+    if there is no engine, or, without a window, if it failed.
     """
 
     def end(smoke: bpy.types.Object, job: Job) -> None:

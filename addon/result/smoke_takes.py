@@ -8,13 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
-from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..core import ShotError
-from ..core.job import Job
+from ..core.job import Job, engine_command
 from ..core.take import Take, new_take, takes
 from ..scene import shot_setup, volume
-from ..scene.blender import absolute, file_of, preferred, relative
+from ..scene.blender import absolute, file_of, preferred, relative, rpt_, thread_options
 from ..scene.scene_file import options as engine_options
 from ..scene.scene_file import shot_files, shot_tables
 from ..scene.smoke import active_smoke, hide_default_cube, is_smoke, scene_of, separate_duplicate, smokes
@@ -44,10 +43,7 @@ runs: list[Run] = []  # the runs of this session, in the order of the queue
 
 
 def output_folder(smoke: bpy.types.Object) -> Path:
-    """The folder of a smoke's takes: the chosen one, else the one that it has, else a new one.
-
-    A new one is in that of the preferences, beside the .blend or beside the clip.
-    """
+    """The folder of a smoke's takes: the chosen one, its own, or one in that of the preferences, .blend or clip."""
     settings = smoke.smokelift
     if folder := settings.output or settings.results:
         return absolute(folder)
@@ -59,10 +55,7 @@ def output_folder(smoke: bpy.types.Object) -> Path:
 
 
 def own_takes(smoke: bpy.types.Object) -> list[Take]:
-    """The takes in a smoke's folder that belong to this file, oldest first.
-
-    Those are what it shows, what was made or shown in it, and what no file is known of that is there.
-    """
+    """The takes in a smoke's folder that this file shows or made, or that no file is known of; the oldest first."""
     here, shown, before = _names_of_file(smoke), volume.directories_on_show(), volume.take_before(smoke)
 
     def belongs(take: Take) -> bool:
@@ -74,7 +67,7 @@ def own_takes(smoke: bpy.types.Object) -> list[Take]:
     return [take for take in takes(output_folder(smoke)) if belongs(take)]
 
 
-def foreign_files(smoke: bpy.types.Object, take: Take) -> list[Path] | None:
+def _foreign_files(smoke: bpy.types.Object, take: Take) -> list[Path] | None:
     """Other .blend files that may show a take; None where that is unknown."""
     files = take.read().files
     return None if files is None else sorted(files - _names_of_file(smoke))
@@ -118,10 +111,7 @@ def write_directed(smoke: bpy.types.Object) -> Take:
 
 
 def _next_take(smoke: bpy.types.Object) -> Take:
-    """The take with the next free number, in a folder that the smoke keeps from now on.
-
-    It takes the place of runs that ended before their first frame.
-    """
+    """The next free take, in a folder that the smoke keeps; it takes the place of runs that ended without a frame."""
     separate_duplicate(smoke)
     folder, in_use = output_folder(smoke), directories_in_use()
     for take in own_takes(smoke):
@@ -160,6 +150,12 @@ def _note_file(*used: Take) -> None:
     if bpy.data.filepath:
         for take in used:
             take.note_file(Path(bpy.data.filepath))
+
+
+def engine_job(smoke: bpy.types.Object, take: Take) -> Job:
+    """The engine's process that makes or resumes a take; ShotError if that cannot be."""
+    words = engine_command(take.arguments() + thread_options())
+    return Job(words, take.log_file, volume.frames_before(smoke, take), take.read().frames)
 
 
 def update_moved_files(smoke: bpy.types.Object, take: Take) -> None:
@@ -222,7 +218,7 @@ def earlier_takes(context: bpy.types.Context) -> list[Take]:
     own, shown, in_use = own_takes(smoke), volume.shown_take(smoke), directories_in_use()
     earlier = own[: own.index(shown)] if shown in own else []
     removable = [
-        take for take in earlier if take.directory.resolve() not in in_use and foreign_files(smoke, take) == []
+        take for take in earlier if take.directory.resolve() not in in_use and _foreign_files(smoke, take) == []
     ]
     while True:  # what is made of a result that goes needs nothing
         needed = {source for take in _known_takes() if take not in removable and (source := take.read().source)}
@@ -237,7 +233,7 @@ def consequences(context: bpy.types.Context, take: Take) -> list[str]:
     made = [other.read().title for other in _known_takes() if other.read().source == take]
     if made:
         said.append(rpt_("Made of it: {:s}.").format(", ".join(made)))
-    files = foreign_files(active_smoke(context.scene), take)
+    files = _foreign_files(active_smoke(context.scene), take)
     if files is None:
         said.append(rpt_("An earlier version of Smokelift made it: other files may show it."))
     elif files:

@@ -11,6 +11,8 @@ from typing import Any
 import bpy
 import numpy as np
 from bpy.app.handlers import persistent
+from bpy.app.translations import pgettext_iface as iface_  # noqa: F401 - from here for all, as rpt_ is
+from bpy.app.translations import pgettext_rpt as rpt_  # noqa: F401
 
 PACKAGE = __package__.rpartition(".")[0]  # the add-on's name, under which Blender keeps its preferences
 
@@ -18,6 +20,7 @@ PACKAGE = __package__.rpartition(".")[0]  # the add-on's name, under which Blend
 PATH_OPTIONS = {"ANIMATABLE"} | ({"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5, 0) else set())
 """Options of properties that hold a path."""
 
+Timer = Callable[[], float | None]  # returns the seconds to its next call; None ends it
 TOLERANCE = 1e-5  # difference, relative to the value above 1, that rounding in Blender's 32-bit numbers may make
 
 
@@ -81,44 +84,37 @@ def thread_options() -> list[str]:
     return ["--threads", str(threads)] if threads else []
 
 
-def set_unless_changed(owner: bpy.types.ID, name: str, holder: Any, attribute: str, value: Any) -> None:
-    """Set a value for the first time, or again if it is still as it was set last.
+def set_unless_changed(
+    owner: bpy.types.ID, name: str, holder: Any, attribute: str, value: Any, anyway: bool = False
+) -> None:
+    """Set a value for the first time, or again if it is still as it was set last, or ``anyway``.
 
     The owner remembers what was set, in its custom property ``smokelift_NAME``. Blender keeps the value, a number,
     a vector or a matrix, in an attribute of the holder.
     """
-    before, found = owner.get(_remembered(name)), np.ravel(getattr(holder, attribute))
-    if before is not None:
-        last = np.array(before)
+    key, found = f"smokelift_{name.lower().replace(' ', '_')}", np.ravel(getattr(holder, attribute))
+    if not anyway and key in owner:
+        last = np.array(owner[key])
         if found.shape != last.shape or not np.all(abs(found - last) <= TOLERANCE * np.maximum(1.0, abs(last))):
             return
-    set_and_remember(owner, name, holder, attribute, value)
-
-
-def set_and_remember(owner: bpy.types.ID, name: str, holder: Any, attribute: str, value: Any) -> None:
-    """Set a value, whatever it is, so that it follows the newest result from now on; parameters as above."""
     setattr(holder, attribute, value)
-    owner[_remembered(name)] = np.ravel(getattr(holder, attribute)).astype(float).tolist()
+    owner[key] = np.ravel(getattr(holder, attribute)).astype(float).tolist()
 
 
-def _remembered(name: str) -> str:
-    return f"smokelift_{name.lower().replace(' ', '_')}"
-
-
-def call_later(timer: Callable[[], float | None], seconds: float) -> None:
+def call_later(timer: Timer, seconds: float) -> None:
     """Have Blender call a function, once, however often it is asked for."""
     cancel_call(timer)
     bpy.app.timers.register(timer, first_interval=seconds)
     _called_later.add(timer)
 
 
-def cancel_call(timer: Callable[[], float | None]) -> None:
+def cancel_call(timer: Timer) -> None:
     """Have Blender not call it."""
     if bpy.app.timers.is_registered(timer):
         bpy.app.timers.unregister(timer)
 
 
-_called_later: set[Callable[[], float | None]] = set()  # what Blender was ever asked to call
+_called_later: set[Timer] = set()  # what Blender was ever asked to call
 
 
 def register_modules(modules: Sequence[ModuleType]) -> None:

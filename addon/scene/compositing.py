@@ -10,8 +10,8 @@ from typing import Any
 import bpy
 from mathutils import Matrix, Vector
 
-from .box import engine_to_world
-from .nodes import SINCE_5, Socket, Tree, add_node, color, feed, file_group, number, set_kind
+from .geometry import engine_to_world
+from .nodes import SINCE_5, Socket, Tree, add_node, color, compositor, feed, file_group, number, set_kind
 from .plate import shown_background, synchronize_plate
 from .smoke import scene_of
 from .volume import shown
@@ -105,24 +105,6 @@ def _catch_shadow(scene: bpy.types.Scene, smoke: bpy.types.Object, domain: dict[
     plane.visible_volume_scatter = plane.visible_diffuse = plane.visible_shadow = False
     plane.display_type = "WIRE"
     scene.collection.objects.link(plane)
-
-
-def compositor(scene: bpy.types.Scene) -> tuple[Tree, Socket]:
-    """The scene's compositor, made if there is none, and the socket of its output."""
-    if SINCE_5:
-        tree = scene.compositing_node_group
-        if tree is None:
-            tree = scene.compositing_node_group = bpy.data.node_groups.new("Compositing", "CompositorNodeTree")
-        if not any(item.item_type == "SOCKET" and item.in_out == "OUTPUT" for item in tree.interface.items_tree):
-            tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
-        kind, identifier = "GROUP_OUTPUT", "NodeGroupOutput"
-    else:
-        scene.use_nodes = True
-        tree = scene.node_tree
-        kind, identifier = "COMPOSITE", "CompositorNodeComposite"
-    scene.render.use_compositing = True
-    output = next((node for node in tree.nodes if node.type == kind), None) or tree.nodes.new(identifier)
-    return tree, output.inputs[0]
 
 
 def _insert(tree: Tree, shown: Socket) -> bpy.types.Node:

@@ -8,7 +8,7 @@ from typing import Any
 
 import bpy
 
-from .blender import set_and_remember, set_unless_changed
+from .blender import set_unless_changed
 from .nodes import add_node, color, empty_material, file_group, math_node, number, scaled_vector, vector_node
 
 NODE = "Smokelift"  # name of the node that holds the values; a material without it is the artist's own
@@ -139,7 +139,7 @@ def use_preset(smoke: bpy.types.Object, name: str, fitted_anisotropy: float) -> 
         smoke.material_slots[0].material = own
     node = node_of(smoke)
     socket = node.inputs["Anisotropy"]
-    set_and_remember(material_of(smoke), socket.name, socket, "default_value", fitted_anisotropy)
+    set_unless_changed(material_of(smoke), socket.name, socket, "default_value", fitted_anisotropy, anyway=True)
     as_in_clip = {item.name: item.default for item in _INPUTS[:6]}
     for key, value in (as_in_clip | PRESETS[name][2]).items():
         if key in node.inputs:

@@ -16,19 +16,7 @@ import bpy
 
 from ..core.contract import PROXY_FILE, PROXY_VOXELS
 from ..core.take import Take
-from .nodes import (
-    SINCE_5,
-    Input,
-    Socket,
-    Tree,
-    add_node,
-    file_group,
-    get_input,
-    input_path,
-    math_node,
-    number,
-    set_input,
-)
+from .nodes import SINCE_5, Input, Socket, Tree, add_node, file_group, math_node, number
 
 
 @dataclass(frozen=True)
@@ -49,7 +37,7 @@ class SecondVolume:
     def volume(self, smoke: bpy.types.Object) -> bpy.types.Volume | None:
         """The second Volume of a smoke."""
         modifier = self.modifier(smoke)
-        obj = get_input(modifier, self.socket) if modifier is not None else None
+        obj = _get_input(modifier, self.socket) if modifier is not None else None
         return obj.data if obj is not None else None
 
     def add(self, smoke: bpy.types.Object) -> bpy.types.Modifier:
@@ -61,10 +49,10 @@ class SecondVolume:
             group = file_group(self.name, "GeometryNodeTree", self.mark, self.inputs, outputs, self.build)
             modifier.node_group = group
             smoke.modifiers.move(len(smoke.modifiers) - 1, 0)  # those of the artist act on what it makes
-        obj = get_input(modifier, self.socket)
+        obj = _get_input(modifier, self.socket)
         if obj is None or obj.users > 1:  # that of the smoke that this one is a duplicate of
             obj = bpy.data.objects.new(f"{smoke.name} {self.socket}", smoke.data.copy())
-            set_input(modifier, self.socket, obj)
+            _set_input(modifier, self.socket, obj)
         if list(obj.data.materials) != list(smoke.data.materials):
             obj.data.materials.clear()
             for material in smoke.data.materials:
@@ -76,8 +64,8 @@ class SecondVolume:
         modifier = self.modifier(smoke)
         if modifier is None:
             return
-        obj = get_input(modifier, self.socket)
-        set_input(modifier, self.socket, None)  # Blender 5.2 would go on counting it as used
+        obj = _get_input(modifier, self.socket)
+        _set_input(modifier, self.socket, None)  # Blender 5.2 would go on counting it as used
         smoke.modifiers.remove(modifier)
         if obj is not None and obj.users == 0:  # else it is that of a duplicate, too
             bpy.data.volumes.remove(obj.data)  # takes the object with it
@@ -140,15 +128,12 @@ def fit_interpolation(smoke: bpy.types.Object, wanted: bool) -> None:
 
 
 def drive_interpolation(smoke: bpy.types.Object, place: str, seconds: float) -> None:
-    """Say where in the take a smoke is in a frame of the scene, if it has frames between.
-
-    The place, in frames, is an expression for a driver. From one frame to the next it is so many seconds.
-    """
+    """Drive frames between by the place in the take, an expression in frames, of which each lasts so many seconds."""
     modifier = FRAMES_BETWEEN.modifier(smoke)
     if modifier is None:
         return
-    set_input(modifier, "Seconds", seconds)
-    path = input_path(modifier, "Part")
+    _set_input(modifier, "Seconds", seconds)
+    path = _input_path(modifier, "Part")
     smoke.driver_remove(path)
     smoke.driver_add(path).driver.expression = f"fmod({place},1)"
 
@@ -183,3 +168,33 @@ FRAMES_BETWEEN = SecondVolume(
     "Smokelift Frames Between", "smokelift_between", _INTERPOLATION_INPUTS, _build_interpolation, "Next Frame"
 )
 """Computes frames between two of a take; its Volume plays the frame after the one that the smoke plays."""
+
+
+def _get_input(modifier: bpy.types.Modifier, name: str) -> Any:
+    """The value of an input of a modifier's node group."""
+    holder, key = _input(modifier, name)
+    return holder.value if key is None else holder.get(key)
+
+
+def _set_input(modifier: bpy.types.Modifier, name: str, value: Any) -> None:
+    """Set an input of a modifier's node group."""
+    holder, key = _input(modifier, name)
+    if key is None:
+        holder.value = value
+    else:
+        holder[key] = value
+
+
+def _input(modifier: bpy.types.Modifier, name: str) -> tuple[Any, str | None]:
+    """What holds an input of a modifier as its attribute ``value``, or before 5.2 the modifier itself and the key."""
+    key = modifier.node_group.interface.items_tree[name].identifier
+    return (getattr(modifier.properties.inputs, key), None) if hasattr(modifier, "properties") else (modifier, key)
+
+
+def _input_path(modifier: bpy.types.Modifier, name: str) -> str:
+    """The path from its object to the value of an input of a modifier's node group, for a driver."""
+    _, key = _input(modifier, name)
+    before = f'modifiers["{modifier.name}"]'
+    if key is not None:
+        return f'{before}["{key}"]'
+    return f"{before}.properties.inputs.{modifier.node_group.interface.items_tree[name].identifier}.value"

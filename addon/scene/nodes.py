@@ -45,13 +45,30 @@ def empty_material(name: str) -> bpy.types.Material:
     return material
 
 
+def compositor(scene: bpy.types.Scene) -> tuple[Tree, Socket]:
+    """The scene's compositor, made if there is none, and the socket of its output."""
+    if SINCE_5:
+        tree = scene.compositing_node_group
+        if tree is None:
+            tree = scene.compositing_node_group = bpy.data.node_groups.new("Compositing", "CompositorNodeTree")
+        if not any(item.item_type == "SOCKET" and item.in_out == "OUTPUT" for item in tree.interface.items_tree):
+            tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
+        kind, identifier = "GROUP_OUTPUT", "NodeGroupOutput"
+    else:
+        scene.use_nodes = True
+        tree = scene.node_tree
+        kind, identifier = "COMPOSITE", "CompositorNodeComposite"
+    scene.render.use_compositing = True
+    output = next((node for node in tree.nodes if node.type == kind), None) or tree.nodes.new(identifier)
+    return tree, output.inputs[0]
+
+
 def file_group(
     name: str, kind: str, mark: str, inputs: Sequence[Input], outputs: Mapping[str, str], build: Callable[[Tree], None]
 ) -> Tree:
-    """The file's own node group, which the artist may have changed, or else a new one, whose nodes ``build`` adds.
+    """The file's own node group of a mark, its custom property, or else a new one, whose nodes ``build`` adds.
 
-    The kind is that of its tree. The mark is the custom property by which it is found under any name. Outputs are
-    names and types.
+    The kind is that of its tree; outputs are names and types.
     """
     for group in bpy.data.node_groups:
         if group.library is None and group.get(mark):
@@ -122,33 +139,3 @@ def feed(tree: Tree, socket: Socket, value: Any) -> None:
         tree.links.new(value, socket)
     else:
         socket.default_value = value
-
-
-def get_input(modifier: bpy.types.Modifier, name: str) -> Any:
-    """The value of an input of a modifier's node group."""
-    holder, key = _input(modifier, name)
-    return holder.value if key is None else holder.get(key)
-
-
-def set_input(modifier: bpy.types.Modifier, name: str, value: Any) -> None:
-    """Set an input of a modifier's node group."""
-    holder, key = _input(modifier, name)
-    if key is None:
-        holder.value = value
-    else:
-        holder[key] = value
-
-
-def _input(modifier: bpy.types.Modifier, name: str) -> tuple[Any, str | None]:
-    """What holds an input of a modifier as its attribute ``value``, or before 5.2 the modifier itself and the key."""
-    key = modifier.node_group.interface.items_tree[name].identifier
-    return (getattr(modifier.properties.inputs, key), None) if hasattr(modifier, "properties") else (modifier, key)
-
-
-def input_path(modifier: bpy.types.Modifier, name: str) -> str:
-    """The path from its object to the value of an input of a modifier's node group, for a driver."""
-    _, key = _input(modifier, name)
-    before = f'modifiers["{modifier.name}"]'
-    if key is not None:
-        return f'{before}["{key}"]'
-    return f"{before}.properties.inputs.{modifier.node_group.interface.items_tree[name].identifier}.value"

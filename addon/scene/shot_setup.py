@@ -4,20 +4,17 @@ Everything made here is found again by its name, so a second set-up changes noth
 """
 
 import math
-from collections.abc import Callable
 from typing import Any
 
 import bpy
-from bpy.app.translations import pgettext_rpt as rpt_
 from mathutils import Matrix, Vector
 
 from . import volume
-from .blender import set_and_remember, set_unless_changed
+from .blender import rpt_, set_unless_changed
 from .clip import used_range
 from .compositing import composite, disable_composite
 from .nodes import add_node
-from .plate import show_clip_behind, show_plate, show_plate_behind
-from .projection import project, show_card
+from .plate import project, show_card, show_clip_behind, show_plate, show_plate_behind
 from .smoke import ASSUMED_CAMERA, hide_default_lamp, scene_of, smokes
 
 NAME = "Smokelift"
@@ -40,7 +37,7 @@ def match_clip(smoke: bpy.types.Object) -> None:
     if clip.source == "MOVIE" and clip.fps > 0.0:
         render.fps = math.ceil(clip.fps - 1e-3)
         render.fps_base = render.fps / clip.fps
-    _set_range(scene, set_and_remember)
+    _set_range(scene, anyway=True)
 
 
 def follow_range(smoke: bpy.types.Object) -> None:
@@ -48,17 +45,17 @@ def follow_range(smoke: bpy.types.Object) -> None:
     scene, clip = scene_of(smoke), smoke.smokelift.clip
     of_clip = (clip.frame_start, clip.frame_start + clip.frame_duration - 1) if clip is not None else NEW_RANGE
     if "smokelift_frame_end" in scene or (scene.frame_start, scene.frame_end) in (NEW_RANGE, of_clip):
-        _set_range(scene, set_unless_changed)
+        _set_range(scene)
 
 
-def _set_range(scene: bpy.types.Scene, set_value: Callable[[bpy.types.ID, str, Any, str, Any], None]) -> None:
+def _set_range(scene: bpy.types.Scene, anyway: bool = False) -> None:
     """Set the scene's range to that of the results on show, and of the used frames of clips that have none yet."""
     ranges = [volume.shown_range(smoke) or used_range(smoke.smokelift) for smoke in smokes(scene)]
     found = [each for each in ranges if each is not None]
     if found:
         firsts, lasts = zip(*found, strict=True)
-        set_value(scene, "frame_end", scene, "frame_end", max(lasts))
-        set_value(scene, "frame_start", scene, "frame_start", min(firsts))
+        set_unless_changed(scene, "frame_end", scene, "frame_end", max(lasts), anyway)
+        set_unless_changed(scene, "frame_start", scene, "frame_start", min(firsts), anyway)
 
 
 def set_up(smoke: bpy.types.Object) -> list[str]:
@@ -178,7 +175,6 @@ def _estimated_suns(scene: bpy.types.Scene, fitted: dict[str, Any], tables: list
 
 
 def _is_estimated(obj: bpy.types.Object) -> bool:
-    """Whether an object is a light of ours."""
     return f"{obj.name} ".startswith(f"{NAME} Light ")
 
 

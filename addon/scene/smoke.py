@@ -102,10 +102,7 @@ def free_folder(smoke: bpy.types.Object) -> str:
 
 
 def separate_duplicate(smoke: bpy.types.Object) -> None:
-    """Give a duplicate of another smoke a folder, and a Volume, of its own before it gets a take of its own.
-
-    The duplicate is the younger one; what both show stays where it is.
-    """
+    """Give a duplicate, the younger of two, a folder and a Volume of its own before it gets a take of its own."""
     settings = smoke.smokelift
     twins = [obj for obj in bpy.data.objects if is_smoke(obj) and obj.smokelift.folder == settings.folder]
     if all(obj.session_uid >= smoke.session_uid for obj in twins):

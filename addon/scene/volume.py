@@ -8,11 +8,10 @@ from pathlib import Path
 import bpy
 from mathutils import Vector
 
-from ..core.contract import DIRECTIONS, FRAME_FILE, MADE_UP, PROXY_FILE
-from ..core.retiming import retiming
+from ..core.contract import DIRECTIONS, FRAME_FILE, MADE_UP, PROXY_FILE, retiming
 from ..core.take import TITLES, Snapshot, Take
 from .blender import absolute, file_of, frame_rate, relative, set_unless_changed
-from .box import engine_to_world
+from .geometry import engine_to_world
 from .look import fit_look
 from .modifiers import FRAMES_BETWEEN, PROXY, drive_interpolation, fit_interpolation, fit_proxy
 from .smoke import scene_of, smokes
@@ -64,15 +63,15 @@ def show_beside(smoke: bpy.types.Object, take: Take) -> bpy.types.Object:
     return copy
 
 
+def shown_take(obj: bpy.types.Object) -> Take | None:
+    """The take that a smoke, or another Volume object, shows."""
+    return take_of(obj.data)
+
+
 def take_of(volume: bpy.types.Volume) -> Take | None:
     """The take that a Volume plays; None for one without a file, whose empty path saving turns into ``//``."""
     path = file_of(volume)
     return Take(path.parent) if path.suffix == ".vdb" else None
-
-
-def shown_take(smoke: bpy.types.Object) -> Take | None:
-    """The take that a smoke shows."""
-    return take_of(smoke.data)
 
 
 def shown(smoke: bpy.types.Object) -> Snapshot | None:
@@ -91,12 +90,6 @@ def take_before(smoke: bpy.types.Object) -> Take | None:
 def directories_on_show() -> set[Path]:
     """Directories, without links, of the takes that Volumes of this file show."""
     return {take.directory.resolve() for data in bpy.data.volumes if (take := take_of(data)) is not None}
-
-
-def number_at(smoke: bpy.types.Object, frame: int) -> int:
-    """The number in the take that a smoke shows in a frame of its scene, without a live timing."""
-    first, steps = _pace(smoke)
-    return first + math.floor((frame - smoke.data.frame_start + EARLY) / steps)
 
 
 def scene_frame(smoke: bpy.types.Object, number: int) -> int:
@@ -146,21 +139,17 @@ def go_to_smoke(smoke: bpy.types.Object) -> bool:
     smoky = [int(n) for n, figures in now.index["frames"].items() if figures.get("mass", 1.0) > 0.0] if now else []
     if not smoky:
         return False
-    number = number_at(smoke, scene.frame_current)
+    first, steps = _pace(smoke)
+    number = first + math.floor((scene.frame_current - smoke.data.frame_start + EARLY) / steps)
     if number not in smoky and not now.numbers[-1] < number <= _last_planned(now):
         scene.frame_set(scene_frame(smoke, min(smoky)))
     return True
 
 
-def provenance_note(smoke: bpy.types.Object) -> str:
-    """What of a smoke is measured and what is not, as a line for the panel; empty if that is unknown."""
-    return smoke.data.get(PROVENANCE, "")
-
-
 def _provenance(now: Snapshot, before: int) -> str:
-    """The line; of what was done last after the clip, with its frames counted on from the clip's.
+    """The line for the panel, with frames counted on from the clip's; empty if nothing is known.
 
-    What was done before names frames of an earlier result, which are others in this one.
+    Of what was done after the clip it says the last: what was done before names frames of an earlier result.
     """
     parts = now.index.get("provenance", [])
     done = [part for part in parts if part["what"] in DIRECTIONS]
@@ -191,8 +180,8 @@ def correct_positions(_file: str = "") -> None:
         _correct_position(smoke, now)
 
 
-def synchronize_playback() -> None:
-    """Play all smokes in step with their clips, after a clip or a scene got another time or rate."""
+def synchronize_playback(_settings: object = None, _context: object = None) -> None:
+    """Play all smokes in step with their clips, after clip, scene or smoke got another time or speed."""
     for smoke, now in _all_shown():
         _set_time(smoke, now)
 
@@ -243,13 +232,13 @@ def _set_time(smoke: bpy.types.Object, now: Snapshot) -> None:
     live = settings.directing.live and _direction(now) != "retime" and not _tracked(now)
     steps = ratio if real else 1.0
     speeds = settings.directing.speeds() if live else (1.0,)
-    timing = retiming(len(numbers), speeds)
     before = frames_before(smoke, shown_take(smoke))
     first = (settings.clip.frame_start if settings.clip else 1) + (round(before * ratio) if real else before)
     set_unless_changed(smoke.data, "start", smoke.data, "frame_start", first)
     start = smoke.data.frame_start
     time = f"(frame-{start}+{EARLY})/{steps:.9g}"
-    place = f"min({timing.place(time)},{len(numbers) - 1})"
+    timing = retiming(len(numbers), speeds, time)
+    place = f"min({timing.place},{len(numbers) - 1})"
     fit_interpolation(smoke, settings.between and (real or live))
     for volume, _, ahead in _volumes(smoke):
         volume.frame_start, volume.frame_offset = start, numbers[0] - 1
@@ -263,7 +252,7 @@ def _set_time(smoke: bpy.types.Object, now: Snapshot) -> None:
             file = f"min(floor({place})+{ahead},{len(numbers) - 1})" if ahead else f"floor({place})"
             volume.driver_add("frame_offset").driver.expression = f"{file}-(frame-{start})+{numbers[0] - 1}"
         if live and len(speeds) > 1:
-            scale = f"{1.0 if real else ratio:.9g}*({timing.speed(time)})"
+            scale = f"{1.0 if real else ratio:.9g}*({timing.speed})"
             volume.driver_add("velocity_scale").driver.expression = scale
     drive_interpolation(smoke, place, 1.0 / now.scene["clip"]["fps"])
 

@@ -16,7 +16,7 @@ from PIL import Image
 
 import addon
 from addon.core.take import Take
-from addon.scene import compositing, look, projection, volume
+from addon.scene import compositing, look, plate, volume
 from benchmarks.blender.pictures import beside, save
 from tests.example_shot import FULL_SIZE, add, set_up_example, smoke
 
@@ -66,7 +66,7 @@ def projected(scene: bpy.types.Scene, obj: bpy.types.Object, folder: Path) -> li
     """The clip's camera, one that has moved away from it, and the same with the plate in the world."""
     obj.smokelift.plate_place = "PROJECTION"
     bpy.ops.smokelift.set_up()
-    card = scene.objects[projection.CARD]
+    card = scene.objects[plate.CARD]
     card.location.y = WALL
     mesh = bpy.data.meshes.new("Ground")
     corners = [(-ROOM, -ROOM), (ROOM, -ROOM), (ROOM, WALL), (-ROOM, WALL)]

@@ -9,7 +9,7 @@ from benchmarks.disturbances.spoiled import FIRST, taken
 from benchmarks.disturbances.whole_run import seen_in, smooth
 from benchmarks.filming import filmed
 from benchmarks.measure import Figures, view_figures
-from smokelift.baselines.velocity import PaperVelocity
+from smokelift.baselines.paper_method import PaperVelocity
 from smokelift.density import ViewSet
 from smokelift.evaluation.frame_means import SMOKE_FRACTION
 from smokelift.evaluation.metrics import velocity_error

@@ -27,8 +27,7 @@ from benchmarks.tables import markdown
 from smokelift.evaluation.metrics import volume_error
 from smokelift.output.images import write_image
 from smokelift.render import Optics, Renderer
-from smokelift.render.environment import EnvironmentCells
-from smokelift.render.image import environment_count
+from smokelift.render.environment import EnvironmentCells, environment_count
 from smokelift.scene import Camera, DirectionalLight, Domain, EnvironmentLight, FiniteLight, Medium, PointLight
 
 Array = npt.NDArray[np.floating[Any]]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from benchmarks.renderer.scene import BenchScene
 from smokelift.checks import Array
-from smokelift.render.camera_rays import camera_rays
+from smokelift.render.plan import camera_rays
 from smokelift.scene.domain import LATERAL
 
 Ints = NDArray[np.int32]

@@ -21,7 +21,7 @@ from benchmarks import machine
 from benchmarks.tables import line, markdown, number, size_text, sizes_of
 from benchmarks.velocity.flow import built_in_pair
 from benchmarks.velocity.pairs import Pair, pair_of_truth
-from smokelift.baselines.velocity import PaperVelocity
+from smokelift.baselines.paper_method import PaperVelocity
 from smokelift.evaluation.metrics import volume_error
 from smokelift.evaluation.truth import Truth
 from smokelift.velocity import CoarseToFine, DensityPair, PrimalDual, ProjectedCG, VelocityEstimator, VelocitySettings

@@ -19,7 +19,7 @@ from scipy import ndimage
 from benchmarks.machine import poisson_seconds
 from benchmarks.tables import markdown
 from benchmarks.velocity.pairs import away_from, near_smoke
-from smokelift.baselines.velocity import PaperVelocity
+from smokelift.baselines.paper_method import PaperVelocity
 from smokelift.checks import Array
 from smokelift.evaluation.metrics import volume_error
 from smokelift.evaluation.truth import Truth

@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 INSIDE = Path(__file__).parent / "inside"
-LONG = ["command_line", "compositing", "directing", "export", "projection", "scene_file", "volume", "whole"]
+LONG = ["command_line", "compositing", "directing", "export", "plate", "scene_file", "volume", "whole"]
 FILES = sorted(path for path in INSIDE.rglob("*.py") if path.stem not in ("conftest", *LONG))
 SECONDS = 600
 

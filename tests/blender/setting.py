@@ -60,14 +60,7 @@ def run(command: Sequence[str], environment: dict[str, str] | None = None) -> st
     # a pytest in a Blender is nobody's worker, as the one that runs it may be
     inherited = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST_XDIST")}
     # from elsewhere than the sources, which would be imported by accident
-    done = subprocess.run(
-        command,
-        cwd=WORK,
-        env=inherited | (environment or {}),
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        timeout=LONGEST,
-    )
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
+    done = subprocess.run(command, cwd=WORK, env=inherited | (environment or {}), timeout=LONGEST, **pipes)
     assert done.returncode == 0, f"status {done.returncode} of {' '.join(command)}\n{done.stdout[-20_000:]}"
     return done.stdout

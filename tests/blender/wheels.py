@@ -25,21 +25,11 @@ def offline() -> list[str]:
 
 
 class InWheel:
-    """The tests in a wheel, which one process runs: it makes the wheel's environment.
+    """The tests in a wheel, which one process runs: it makes the wheel's environment."""
 
-    Attributes
-    ----------
-    blender
-        The wheel's version.
-    python
-        The version of Python that it is for.
-    numpy
-        Requirement that gives it the numpy of the official build, not the newest that it accepts.
-    """
-
-    blender: str
-    python: str
-    numpy: str
+    blender: str  # the wheel's version
+    python: str  # the version of Python that it is for
+    numpy: str  # requirement that gives it the numpy of the official build, not the newest that it accepts
 
     @pytest.fixture(scope="class")
     @classmethod

@@ -8,9 +8,8 @@ centers at integers. Volumes are read trilinearly, and beyond the outermost cent
 sample's weights always add up to one.
 """
 
-import taichi as ti
-
-from smokelift.render.gpu.light_kernels import integers3, ndarray2, ndarray3, ndarray4, vec3
+from smokelift.render.gpu_kernels import integers3, ndarray2, ndarray3, ndarray4, vec3
+from smokelift.render.taichi_runtime import ti
 
 
 @ti.func

@@ -33,15 +33,11 @@ trilinearly, and the record is spread with the same weights.
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.render import device
-from smokelift.render import taichi_runtime as taichi
-
-# isort: split
-# what imports Taichi comes after the runtime, which suppresses its greeting
 from smokelift.baselines import kernels
-from smokelift.render.gpu import camera_kernels
-from smokelift.render.gpu.backend import LightSweeps
-from smokelift.render.light_sweeps import ParallelSweep
+from smokelift.render import device, gpu_kernels
+from smokelift.render import taichi_runtime as taichi
+from smokelift.render.gpu_backend import LightSweeps
+from smokelift.render.plan import ParallelSweep
 from smokelift.render.renderer import Image, Optics, Volume
 from smokelift.scene import Camera, Domain
 from smokelift.scene.camera import ray_through_pixels
@@ -86,7 +82,7 @@ class PaperRenderer:
 
     def image(self, density: Volume) -> Image:
         """Render a density (nx, ny, nz) in linear radiance (rows, columns, 3), and record its derivatives."""
-        camera_kernels.pack(taichi.upload(density), self._voxels, self._extinction, self.medium.extinction)
+        gpu_kernels.pack(taichi.upload(density), self._voxels, self._extinction, self.medium.extinction)
         if self._shadows:
             self._shade()
         kernels.march(

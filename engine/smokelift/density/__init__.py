@@ -19,12 +19,7 @@ from smokelift.density.fit import (
 )
 from smokelift.density.observation import Observation, ObservedClip, ObservedView, ViewSet
 from smokelift.density.synthesis import DetailedDepth
-from smokelift.density.temporal_prior import (
-    AdvectedDetail,
-    NothingCarried,
-    Start,
-    TemporalPrior,
-)
+from smokelift.density.temporal_prior import AdvectedDetail, NothingCarried, Start, TemporalPrior
 from smokelift.density.upright_plane import AxisEstimate
 
 __all__ = [

@@ -18,11 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.density.hull import Places, project_voxels
-from smokelift.density.levels import any_of_two, with_neighbors
+from smokelift.density.lattice_noise import Scatter, Wander
+from smokelift.density.objective import any_of_two, with_neighbors
 from smokelift.density.observation import ObservedClip, ObservedView, ViewSet, shadowed_optical_depth
 from smokelift.density.profile import PROFILE_CUT, DepthProfile
 from smokelift.density.upright_plane import SmokeAxis, view_frame
-from smokelift.density.wander import Scatter, Wander
 from smokelift.render import Volume
 from smokelift.scene import SHADOWED
 from smokelift.scene.domain import box_around

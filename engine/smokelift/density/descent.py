@@ -62,25 +62,22 @@ def descend(
     tolerance: float,
     patience: int,
     *,
-    bound: float = np.inf,
-    expected: Volume | None = None,
+    bound: float,
+    expected: Volume,
 ) -> Fit:
     """Minimize the objective from a start (nx, ny, nz), in the voxels ``where`` smoke may be: the renderers' support.
 
-    The result takes the start's place, which is zero outside them.
-    It ends after so many iterations, or after ``patience`` steps in a row that each gain less than ``tolerance``, a
-    fraction of the objective: one may gain little and the next much. No voxel exceeds ``bound``; the start is cut to
-    it. ``expected`` (nx, ny, nz) bounds the scale of empty voxels, so that smoke fades where a prior expects none.
+    The result takes the start's place, which is zero outside them. It ends after so many iterations, or after
+    ``patience`` steps in a row that each gain less than ``tolerance``, a fraction of the objective: one may gain little
+    and the next much. No voxel exceeds ``bound``; the start is cut to it. ``expected`` (nx, ny, nz) bounds the scale of
+    empty voxels, so that smoke fades where a prior expects none.
     """
-    if expected is not None:
-        where = where.above_zero(density, expected)
+    where = where.above_zero(density, expected)
     current = where.take(density)
     np.minimum(current, np.float32(bound), out=current)
-    floor = np.full(current.shape, FLOOR * current.mean() if current.size else 0, np.float32)
-    if expected is not None:
-        np.minimum(floor, where.take(expected), out=floor)
-    problem = _Problem(terms, where, density, np.zeros(density.shape, np.float32), floor)
-    problem.scale += current
+    floor = where.take(expected)
+    np.minimum(floor, np.float32(FLOOR * current.mean() if current.size else 0), out=floor)
+    problem = _Problem(terms, where, density, floor, current)
     residuals = problem.residuals(current)
     loss, enough = objective(terms, residuals), noise_floor(terms)
     room = _Room(current.size)
@@ -130,16 +127,15 @@ class _Room:
 class _Problem:
     """The objective of the voxels `where` of a density.
 
-    `volume` (nx, ny, nz) is the density that was shown last, and ``slopes`` (nx, ny, nz) room for a gradient. `floor`
-    (n,) is the unit of an empty voxel, `scale` (n,) that of each.
+    `volume` (nx, ny, nz) is the density that was shown last. `floor` (n,) is the unit of an empty voxel, and beside the
+    ``start`` (n,) that of each.
     """
 
     def __init__(
-        self, terms: Sequence[Term], where: _core.MarkedVoxels, volume: Volume, slopes: Volume, floor: Array
+        self, terms: Sequence[Term], where: _core.MarkedVoxels, volume: Volume, floor: Array, start: Array
     ) -> None:
-        self.terms, self.volume, self.floor = terms, volume, floor
-        self.scale = floor.copy()
-        self._where, self._slopes = where, slopes
+        self.terms, self.volume, self.floor, self.scale = terms, volume, floor, floor + start
+        self._where, self._slopes = where, np.zeros(volume.shape, np.float32)
 
     def show(self, density: Array) -> None:
         """Write a density of the voxels (n,) into the volume."""
@@ -199,7 +195,8 @@ class _Curvature:
 
     Of each of the last `MEMORY` steps it keeps s, the step itself, y, the change of the gradient along it, and their
     product ys = 1 / rho (Nocedal, "Updating quasi-Newton matrices with limited storage", 1980). Where nothing is known,
-    the inverse of the second derivatives is a multiple of what neighbors share.
+    the inverse of the second derivatives is a multiple of what neighbors share: a voxel and, `SHARED` times as much,
+    the means over its cubes, those of two lattices half a cube apart, so that no cube shows.
     """
 
     def __init__(self, where: _core.MarkedVoxels, room: _Room) -> None:
@@ -229,10 +226,11 @@ class _Curvature:
             saxpy(y, q, a=-alphas[-1])
         if self._steps:
             _, y, ys = self._steps[-1]
-            shared = with_neighbors(self._where, y, self._room.take())
+            shared = self._room.take()
+            self._where.smooth_in_cubes(y, BLOCK, SHARED, shared)
             q *= np.float32(ys / _dot(y, shared))
             self._room.give(shared)
-        with_neighbors(self._where, q, q)
+        self._where.smooth_in_cubes(q, BLOCK, SHARED, q)
         for (s, y, ys), alpha in zip(self._steps, reversed(alphas), strict=True):
             beta = _dot(y, q) / ys
             saxpy(s, q, a=alpha - beta)
@@ -242,15 +240,6 @@ def _free(values: Array, gradient: Array, density: Array, bound: float, out: Arr
     """Write values, but 0 where a density is 0 or at its bound and the gradient leads beyond that."""
     np.copyto(out, values)
     out[((density <= 0) & (gradient > 0)) | ((density >= bound) & (gradient < 0))] = 0
-
-
-def with_neighbors(where: _core.MarkedVoxels, values: Array, out: Array) -> Array:
-    """The voxels' values (n,) and, `SHARED` times as much, their means over cubes.
-
-    The cubes are those of two lattices half a cube apart, so that no cube shows. The result may replace the values.
-    """
-    where.smooth_in_cubes(values, BLOCK, SHARED, out)
-    return out
 
 
 def _dot(a: Array, b: Array) -> float:

@@ -11,15 +11,13 @@ from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 import smokelift._core as _core
-from smokelift.checks import MAX_MAGNITUDE, listed, numbers, require_kind
+from smokelift.checks import MAX_MAGNITUDE, Mask, listed, numbers, require_kind
 from smokelift.density.depth_prior import DepthEstimate, RoundDepth
 from smokelift.density.descent import descend
-from smokelift.density.levels import BLUR_REACH
 from smokelift.density.multiplicative import fit_multiplicative
-from smokelift.density.objective import camera_terms
+from smokelift.density.objective import BLUR_REACH, camera_terms
 from smokelift.density.observation import Observation, ViewSet, eight_bit_plate
 from smokelift.extraction.element import extract_element, shows_transmittance, usual_source
 from smokelift.extraction.given_background import background_picture, single_color
@@ -96,7 +94,7 @@ class FittedDensity:
     """
 
     density: Volume
-    hull: NDArray[np.bool_]
+    hull: Mask
     figures: Mapping[str, float] = field(default_factory=dict)
     smooth_density: Volume | None = None
     for_advection: Volume | None = None
@@ -261,7 +259,7 @@ def without_traces(density: Volume, within: _core.MarkedVoxels) -> Volume:
     return result
 
 
-def _without_single_voxels(before: Volume, after: Volume, hull: NDArray[np.bool_]) -> Volume:
+def _without_single_voxels(before: Volume, after: Volume, hull: Mask) -> Volume:
     """The density before a descent with the descent's changes, but for those of single voxels, in its place."""
     box = box_around(hull, 1)
     below, changed = (_core.blur(each[box], SINGLE_VOXELS, BLUR_REACH) for each in (before, after))

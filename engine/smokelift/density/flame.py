@@ -8,9 +8,9 @@ what it was. Figures: docs/experiments/fire.md.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage, sparse
 
+from smokelift.checks import Array, Doubles
 from smokelift.density.hull import project_voxels, visual_hull
 from smokelift.density.profile import DepthProfile
 from smokelift.density.upright_plane import SmokeAxis, view_frame
@@ -31,7 +31,7 @@ SMOOTHING = 2.0
 """Standard deviation (voxels) of the average of the smoke's middle along its height."""
 
 
-def flame_emission(light: NDArray[np.float32], camera: Camera, density: Volume, optics: Optics) -> Volume:
+def flame_emission(light: Array, camera: Camera, density: Volume, optics: Optics) -> Volume:
     """Reconstruct the emission (nx, ny, nz) of a flame, radiance per meter.
 
     ``light`` (rows, columns) is the radiance that the flame adds to the picture of the smoke, not negative. The camera
@@ -54,7 +54,7 @@ def flame_emission(light: NDArray[np.float32], camera: Camera, density: Volume, 
     return flame
 
 
-def _scaled(emission: NDArray[np.float64], light: NDArray[np.float64], matrix: sparse.csr_array) -> NDArray[np.float64]:
+def _scaled(emission: Doubles, light: Doubles, matrix: sparse.csr_array) -> Doubles:
     """The emission (voxels,) that shows the light (pixels,) through the matrix (pixels, voxels)."""
     seen = matrix.sum(0)
     emission = np.where(seen > 0, emission, 0)

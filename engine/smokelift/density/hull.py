@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 import smokelift._core as _core
+from smokelift.checks import Array, Mask
 from smokelift.scene import Camera, Domain
 from smokelift.scene.camera import world_to_pixel
 
@@ -22,11 +23,11 @@ class Places:
     whether they are before the camera and their center falls into the picture.
     """
 
-    rows: NDArray[np.float32]
-    columns: NDArray[np.float32]
-    visible: NDArray[np.bool_]
+    rows: Array
+    columns: Array
+    visible: Mask
 
-    def read(self, picture: NDArray[np.floating[Any]]) -> NDArray[np.float32]:
+    def read(self, picture: NDArray[np.floating[Any]]) -> Array:
         """The picture (rows, columns) read bilinearly there (n,); the nearest pixel's value outside."""
         return _core.read_bilinearly(picture, self.rows, self.columns)
 
@@ -43,19 +44,19 @@ class Projection:
     _size: tuple[int, int]
 
     @cached_property
-    def visible(self) -> NDArray[np.bool_]:
+    def visible(self) -> Mask:
         """Voxels (nx, ny, nz) before the camera whose center falls into the picture."""
         return self.shown(np.ones(self._size[::-1], np.bool_))
 
-    def places(self, voxels: NDArray[np.bool_]) -> Places:
+    def places(self, voxels: Mask) -> Places:
         """Where the marked voxels lie, in the order of `numpy.flatnonzero`."""
         return Places(*self.map.places(voxels))
 
-    def shown(self, marked: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    def shown(self, marked: Mask) -> Mask:
         """Visible voxels (nx, ny, nz) whose nearest pixel is marked (rows, columns)."""
         return self.map.shown(marked)
 
-    def read(self, picture: NDArray[np.floating[Any]], voxels: NDArray[np.bool_]) -> NDArray[np.float32]:
+    def read(self, picture: NDArray[np.floating[Any]], voxels: Mask) -> Array:
         """The picture (rows, columns) read at the marked voxels (n,); see `Places.read`."""
         return self.places(voxels).read(picture)
 
@@ -78,7 +79,7 @@ def project_voxels(camera: Camera, domain: Domain) -> Projection:
     return Projection(float(footprint), projected, camera.size)
 
 
-def reached(mask: NDArray[np.bool_], projection: Projection) -> NDArray[np.bool_]:
+def reached(mask: Mask, projection: Projection) -> Mask:
     """Pixels (rows, columns) that the voxels of the mask's hull can change."""
     return np.asarray(ndimage.binary_dilation(mask, iterations=2 * _radius(projection) + 1))
 
@@ -88,13 +89,13 @@ def _radius(projection: Projection) -> int:
     return max(1, round(projection.footprint / 2))
 
 
-def visual_hull(mask: NDArray[np.bool_], projection: Projection) -> NDArray[np.bool_]:
+def visual_hull(mask: Mask, projection: Projection) -> Mask:
     """Voxels (nx, ny, nz) whose footprint touches the mask (rows, columns) of a picture's smoke pixels."""
     grown = ndimage.binary_dilation(mask, iterations=_radius(projection))
     return projection.shown(grown)
 
 
-def common_hull(masks: Sequence[NDArray[np.bool_]], projections: Sequence[Projection]) -> NDArray[np.bool_]:
+def common_hull(masks: Sequence[Mask], projections: Sequence[Projection]) -> Mask:
     """Voxels (nx, ny, nz) that a picture shows, and that every picture which shows them allows to hold smoke."""
     allowed = [visual_hull(mask, projection) for mask, projection in zip(masks, projections, strict=True)]
     if len(allowed) == 1:
@@ -105,7 +106,7 @@ def common_hull(masks: Sequence[NDArray[np.bool_]], projections: Sequence[Projec
     return np.asarray(seen)
 
 
-def agreement(masks: Sequence[NDArray[np.bool_]], projections: Sequence[Projection]) -> float:
+def agreement(masks: Sequence[Mask], projections: Sequence[Projection]) -> float:
     """Fraction of all pictures' smoke pixels behind which voxels lie that no picture rules out; 1 without any smoke.
 
     It is about 1 for true views of the same smoke, and small for cameras that are not where they are said to be.

@@ -22,7 +22,6 @@ multiplicative algebraic reconstruction (Gordon, Bender and Herman 1970).
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 
 import smokelift._core as _core
@@ -72,7 +71,6 @@ def fit_multiplicative(
     current = best = smoke.values
     spare = np.empty_like(current)  # the best is kept, the others are overwritten: new memory takes as long
     least, done = np.inf, 0
-    sensitivities: dict[int, NDArray[np.float32]] = {}
     left: tuple[Image, ...] = ()
     for done in range(iterations + 1):
         volume = smoke.volume_of(current)
@@ -88,8 +86,7 @@ def fit_multiplicative(
             break
         for turn, term in enumerate(terms):
             image = images[0] if turn == 0 else term.renderer.image(smoke.volume_of(current))
-            target = spare if current is best else current
-            current = _scaled(smoke, current, turn, term, image, sensitivities, target)
+            current = smoke.scaled(current, turn, term, image, spare if current is best else current)
     return Fit(smoke.volume_of(best), least, left, done)
 
 
@@ -102,68 +99,55 @@ def take_turns(terms: Sequence[Term], density: Volume, where: _core.MarkedVoxels
     smoke = _Smoke(density, where)
     values = smoke.values
     for turn, term in enumerate(terms):
-        values = _scaled(smoke, values, turn, term, term.renderer.image(smoke.volume_of(values)), {}, values)
+        values = smoke.scaled(values, turn, term, term.renderer.image(smoke.volume_of(values)), values)
     return smoke.volume_of(values)
 
 
 class _Smoke:
     """The voxels of a density that may hold smoke; the others stay at zero.
 
-    Their `values` (n,) are what is computed with. One volume is filled with them again and again for the renderers.
+    Their `values` (n,) are what is computed with. One volume is filled with them again and again for the renderers. The
+    sensitivities of the terms' pictures are measured once.
     """
 
     def __init__(self, density: Volume, where: _core.MarkedVoxels, plausible: Volume | None = None) -> None:
         self._where, self.values = where, where.take(density)
         self._volume = np.zeros(density.shape, np.float32)
+        self._sensitivities: dict[int, Array] = {}
         self._plausible = None if plausible is None else where.take(plausible)
-        self._faint = 0.0
-        if self._plausible is not None:
-            self._faint = MIN_PLAUSIBLE * float(self._plausible.max(initial=MIN_SCALE))
+        densest = 0.0 if self._plausible is None else float(self._plausible.max(initial=MIN_SCALE))
+        self._faint = MIN_PLAUSIBLE * densest
 
     def volume_of(self, values: Array, factor: float = 1.0) -> Volume:
         """The volume (nx, ny, nz) with these values, times a factor; valid until the next call."""
         self._where.put(values, self._volume, factor)
         return self._volume
 
-    def scaled(self, values: Array, term: Term, logarithm: NDArray[np.float32], out: Array) -> Array:
-        """Values scaled along a term's rays by a fraction (`RELAXATION`) of the logarithmic steps (rows, columns)."""
+    def scaled(self, values: Array, turn: int, term: Term, image: Image, out: Array) -> Array:
+        """Values whose picture is nearer to that of the term whose turn it is, from those that render to `image`.
+
+        They are scaled along the term's rays by a fraction (`RELAXATION`) of the steps that its pixels ask for.
+        """
+        transmittance = term.renderer.transmittance
+        if turn not in self._sensitivities:
+            self._sensitivities[turn] = self._sensitivity(values, term, image, transmittance)
+        steps = _log_scale(image, transmittance, self._sensitivities[turn], term)
         rays = term.view.projection.map
-        self._where.scale_along_rays(
-            rays, values, self._plausible, logarithm, self._faint, MAX_UNEVENNESS, RELAXATION, out
-        )
+        self._where.scale_along_rays(rays, values, self._plausible, steps, self._faint, MAX_UNEVENNESS, RELAXATION, out)
         return out
 
-
-def _scaled(
-    smoke: _Smoke,
-    values: Array,
-    turn: int,
-    term: Term,
-    image: Image,
-    sensitivities: dict[int, NDArray[np.float32]],
-    out: Array,
-) -> Array:
-    """Values whose picture is nearer to that of the term whose turn it is, from those that render to `image`.
-
-    ``sensitivities`` are those of the terms' pictures by number, measured where they are not known yet.
-    """
-    transmittance = term.renderer.transmittance
-    if turn not in sensitivities:
-        sensitivities[turn] = _sensitivity(smoke, values, term, image, transmittance)
-    return smoke.scaled(values, term, _log_scale(image, transmittance, sensitivities[turn], term), out)
+    def _sensitivity(self, values: Array, term: Term, image: Image, transmittance: Image) -> Array:
+        """|dL / d ln s| / |L - B| (rows, columns) of a density, whose image and transmittance are given."""
+        if term.renderer.absorbs_only:  # L = T B and ln T is proportional to s
+            slope = image * np.log(np.maximum(transmittance, 1e-30))[..., None]
+        else:
+            slope = (term.renderer.image(self.volume_of(values, PROBE)) - image) / np.log(PROBE)
+        change = image - term.view.background
+        scale = np.maximum(np.sqrt(_over_channels(change, change)), 1e-6)
+        return np.asarray(np.sqrt(_over_channels(slope, slope)) / scale)
 
 
-def _sensitivity(smoke: _Smoke, values: Array, term: Term, image: Image, transmittance: Image) -> NDArray[np.float32]:
-    """|dL / d ln s| / |L - B| (rows, columns) of a density, whose image and transmittance are given."""
-    if term.renderer.absorbs_only:  # L = T B and ln T is proportional to s
-        slope = image * np.log(np.maximum(transmittance, 1e-30))[..., None]
-    else:
-        slope = (term.renderer.image(smoke.volume_of(values, PROBE)) - image) / np.log(PROBE)
-    change = image - term.view.background
-    return np.asarray(np.sqrt(_over_channels(slope, slope)) / np.maximum(np.sqrt(_over_channels(change, change)), 1e-6))
-
-
-def _log_scale(image: Image, transmittance: Image, sensitivity: NDArray[np.float32], term: Term) -> NDArray[np.float32]:
+def _log_scale(image: Image, transmittance: Image, sensitivity: Array, term: Term) -> Array:
     """Logarithm (rows, columns) of each pixel's scale, damped and smoothed."""
     background, weight = term.view.background, np.sqrt(term.weight)
     clear = transmittance[..., None]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 import smokelift._core as _core
-from smokelift.checks import radiance, require_kind
+from smokelift.checks import Array, Doubles, Mask, radiance, require_kind
 from smokelift.density.hull import Projection, common_hull, project_voxels, reached
 from smokelift.density.upright_plane import AxisEstimate
 from smokelift.extraction.element import Element
@@ -160,14 +160,14 @@ class ObservedView:
     left_out: Image
     """(rows, columns, 3): what an element leaves of the observation since it is neither smoke nor its plate; faded like
     the image."""
-    probability: NDArray[np.float32]
+    probability: Array
     """(rows, columns): probability that a pixel shows smoke; what is left of the observation and of its noise."""
-    mask: NDArray[np.bool_]
+    mask: Mask
     """(rows, columns) bool: pixels that may show smoke: where `probability` is not 0."""
-    optical_depth: NDArray[np.float32]
+    optical_depth: Array
     """(rows, columns): of smoke without shadows that explains the picture; 0 outside the mask."""
     projection: Projection
-    influenced: NDArray[np.bool_]
+    influenced: Mask
     """(rows, columns) bool: pixels that the voxels behind the mask can change: a fit is judged by them."""
 
     @staticmethod
@@ -195,7 +195,7 @@ class ObservedView:
             self.camera.resized(columns, rows), image, background, noise, left_out, probability, optics
         )
 
-    def against_darkness(self, source: NDArray[np.float64]) -> bool:
+    def against_darkness(self, source: Doubles) -> bool:
         """Whether the background is dark beside a source radiance (3,) wherever smoke shows."""
         return bool((self.background[self.mask] <= MAX_DARK_RADIANCE * _in_channels(source, self.background)).all())
 
@@ -210,12 +210,11 @@ class ViewSet:
     """All views of one moment, the input's first.
 
     `hull` (nx, ny, nz) marks the voxels that may hold smoke: those that all of them allow, or fewer where a depth prior
-    expects none (`DepthEstimate.views`). `frame` is the number of the moment in
-    its clip, from 0: a depth prior that has seen the clip knows the other moments.
+    expects none (`DepthEstimate.views`). `frame` is the number of the moment in its clip, from 0.
     """
 
     views: tuple[ObservedView, ...]
-    hull: NDArray[np.bool_]
+    hull: Mask
     optics: Optics
     frame: int = 0
 
@@ -253,25 +252,17 @@ class ViewSet:
 
 
 def _against_grid(
-    camera: Camera,
-    image: Image,
-    background: Image,
-    noise: Image,
-    left_out: Image,
-    probability: NDArray[np.float32],
-    optics: Optics,
+    camera: Camera, image: Image, background: Image, noise: Image, left_out: Image, probability: Array, optics: Optics
 ) -> ObservedView:
     """A picture, faded to its background, against the grid of `optics.domain`."""
     mask = probability > 0
     projection = project_voxels(camera, optics.domain)
-    depth = apparent_optical_depth(image, background, noise, mask, optics)
+    depth = _apparent_optical_depth(image, background, noise, mask, optics)
     influenced = reached(mask, projection)
     return ObservedView(camera, image, background, noise, left_out, probability, mask, depth, projection, influenced)
 
 
-def apparent_optical_depth(
-    image: Image, background: Image, noise: Image, mask: NDArray[np.bool_], optics: Optics
-) -> NDArray[np.float32]:
+def _apparent_optical_depth(image: Image, background: Image, noise: Image, mask: Mask, optics: Optics) -> Array:
     """Optical depth (rows, columns) of smoke without shadows that explains a picture: I = J (1 - T) + T B.
 
     J is the source radiance of smoke in the middle of the domain, B the background. T is the least squares solution
@@ -279,10 +270,8 @@ def apparent_optical_depth(
     although J is brighter than B. Only smoke in its own shadow does so. Such a pixel counts as thick as can be shown: a
     fit that starts from less thins it out until nothing is left (docs/experiments/thick-smoke.md).
     """
-    source = np.zeros(3)
-    if optics.scattering != "absorption":
-        source = optics.unshadowed_source()
-    source = _in_channels(source, image)
+    shines = optics.scattering != "absorption"
+    source = _in_channels(optics.unshadowed_source() if shines else np.zeros(3), image)
     contrast = background - source
     if image.shape[-1] > 3:  # shadows do not matter to the last channel
         image, contrast, source = image[..., 3:], contrast[..., 3:], source[3:]
@@ -296,9 +285,7 @@ def apparent_optical_depth(
     return np.where(mask, depth, 0).astype(np.float32)
 
 
-def shadowed_optical_depth(
-    view: ObservedView, image: Image, transmittance: NDArray[np.float32], optics: Optics
-) -> NDArray[np.float32]:
+def shadowed_optical_depth(view: ObservedView, image: Image, transmittance: Array, optics: Optics) -> Array:
     """Optical depth (rows, columns) that explains a view's picture in an estimate's shadows: SHADED_DEPTH ln(1 + r).
 
     The estimate has the view's optical depth. ``image`` (rows, columns, channels) and ``transmittance`` (rows, columns)
@@ -318,7 +305,7 @@ def shadowed_optical_depth(
     return np.where(view.mask, depth, 0).astype(np.float32)
 
 
-def _faint_smoke(element: Element, clear: NDArray[np.bool_]) -> NDArray[np.float32]:
+def _faint_smoke(element: Element, clear: Mask) -> Array:
     """Probability (rows, columns) that an element shows smoke, where the opacity that is found in clear air is noise.
 
     Smoke of the plate's own brightness hardly changes the picture, but it hides the plate's detail. So does a codec, a
@@ -349,7 +336,7 @@ def _over_one_color(element: Element, picture: Image, plate: Plate) -> tuple[Ima
     return image.astype(np.float32), background.astype(np.float32), np.dstack([noise, noise.mean(-1)])
 
 
-def _in_channels(source: NDArray[np.float64], picture: Image) -> NDArray[np.float64]:
+def _in_channels(source: Doubles, picture: Image) -> Doubles:
     """A radiance (3,) of smoke in a picture's channels: what is beyond the colors shows none."""
     return np.pad(source, (0, picture.shape[-1] - len(source)))
 

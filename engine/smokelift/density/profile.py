@@ -18,12 +18,13 @@ the axis than other smoke (docs/experiments/density-profile.md).
 """
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.special import gamma, gammainc
 
 import smokelift._core as _core
+from smokelift.checks import Array, Doubles, Mask
 from smokelift.density.hull import Places
+from smokelift.density.lattice_noise import Scatter
 from smokelift.density.upright_plane import (
     TINY_DOUBLE,
     PlanePicture,
@@ -32,7 +33,6 @@ from smokelift.density.upright_plane import (
     on_upright_plane,
     view_frame,
 )
-from smokelift.density.wander import Scatter
 from smokelift.scene import Camera, Domain
 
 FLATNESS = 3.5
@@ -80,7 +80,7 @@ SMOOTHING = 1.5
 """Standard deviation (pixels) of the Gaussian that smooths the thickness (docs/experiments/density-profile.md)."""
 
 
-def smallest_spread(amount: NDArray[np.float32], camera: Camera, domain: Domain) -> PlanePicture:
+def smallest_spread(amount: Array, camera: Camera, domain: Domain) -> PlanePicture:
     """Standard deviation (m), on the upright plane, of the smoke along the line through each point where it is least.
 
     ``amount`` (rows, columns) is the optical depth, or proportional to it.
@@ -91,7 +91,7 @@ def smallest_spread(amount: NDArray[np.float32], camera: Camera, domain: Domain)
     return PlanePicture(plane.heights, plane.laterals, least)
 
 
-def _spread_along(plane: PlanePicture, turn: float, voxel_size: float) -> NDArray[np.float64]:
+def _spread_along(plane: PlanePicture, turn: float, voxel_size: float) -> Doubles:
     """The smoke's standard deviation (n, m) along the line through each point that rises at an angle (radians).
 
     Lines without smoke take the spread from beside them.
@@ -112,7 +112,7 @@ def _spread_along(plane: PlanePicture, turn: float, voxel_size: float) -> NDArra
     return np.asarray(np.sqrt(np.maximum(variance, voxel_size**2))[line])
 
 
-def inflated(mask: NDArray[np.bool_]) -> NDArray[np.float64]:
+def inflated(mask: Mask) -> Doubles:
     """Half the thickness (pixels), seen from the front, of the balls that fill a silhouette (rows, columns).
 
     About every pixel inside stands the largest ball that stays inside the outline. A pixel shows the ball that is
@@ -130,7 +130,7 @@ def inflated(mask: NDArray[np.bool_]) -> NDArray[np.float64]:
     return half
 
 
-def ball_spread(amount: NDArray[np.float32], camera: Camera, domain: Domain) -> NDArray[np.float32]:
+def ball_spread(amount: Array, camera: Camera, domain: Domain) -> Array:
     """Standard deviation (m) along the depth of the balls that fill the silhouette, at each pixel (rows, columns)."""
     smoky = amount > 0
     mask = amount > SILHOUETTE * (np.percentile(amount[smoky], 90) if smoky.any() else 1.0)
@@ -157,19 +157,21 @@ class DepthProfile:
     """
 
     def __init__(
-        self,
-        amount: NDArray[np.float32],
-        camera: Camera,
-        domain: Domain,
-        axis: SmokeAxis,
-        scatter: Scatter | None = None,
+        self, amount: Array, camera: Camera, domain: Domain, axis: SmokeAxis, scatter: Scatter | None = None
     ) -> None:
         self._domain, self._depth = domain, view_frame(camera)[1]
         self._rays = rays = PlaneRays.of(camera, domain)
         middle = np.zeros(amount.shape)
         for _ in range(STEPS_TO_AXIS):
             middle = axis.at(*rays.at(middle))
-        deviation = _deviation(*rays.at(middle), amount, camera, domain, axis)
+        at = rays.at(middle)
+        if axis.several:
+            across = axis.read(axis.widths, *at)
+        else:
+            across = MIN_SPREAD_BIAS * smallest_spread(amount, camera, domain).read(*at)
+        behind = LASTING_DISTANCE * axis.read(axis.spreads, *at)
+        spread = np.sqrt(across * ball_spread(amount, camera, domain) + behind**2)
+        deviation = np.maximum(spread, domain.voxel_size)  # in depth
         narrowing, offset = 1.0, np.zeros(amount.shape)
         if scatter is not None:
             # a lobe moves as one, so what is as deep as its surroundings on the mean tells how far
@@ -182,26 +184,24 @@ class DepthProfile:
         self._middle = np.where(rays.missed, middle, np.clip(middle, rays.near + room, rays.far - room))
         self._width = np.maximum(width - np.abs(self._middle - middle), ROOM * width)
 
-    def at(self, places: Places, voxels: NDArray[np.bool_]) -> NDArray[np.float32]:
+    def at(self, places: Places, voxels: Mask) -> Array:
         """What is spread (1/m), of unit integral along the depth, at the marked voxels (n,), seen at `places`."""
         profile, width = self._shape_and_width(places, voxels)
         steep = np.log(1 / PROFILE_CUT)
         area = gamma(1 + 1 / FLATNESS) * gammainc(1 / FLATNESS, steep) - PROFILE_CUT * steep ** (1 / FLATNESS)
         return np.asarray(np.maximum(profile - np.float32(PROFILE_CUT), 0) / (np.float32(2 * area) * width))
 
-    def shape(self, places: Places, voxels: NDArray[np.bool_]) -> NDArray[np.float32]:
+    def shape(self, places: Places, voxels: Mask) -> Array:
         """The profile g at the marked voxels (n,), 1 in the middle."""
         return self._shape_and_width(places, voxels)[0]
 
-    def fraction_inside(self) -> NDArray[np.float32]:
+    def fraction_inside(self) -> Array:
         """Fraction (rows, columns) of the profile that each pixel's ray meets inside the domain."""
         ends = [(end - self._middle) / self._width for end in (self._rays.near, self._rays.far)]
         low, high = (np.sign(end) * gammainc(1 / FLATNESS, np.abs(end) ** FLATNESS) for end in ends)
         return np.where(self._rays.missed, 0, (high - low) / 2).astype(np.float32)
 
-    def _shape_and_width(
-        self, places: Places, voxels: NDArray[np.bool_]
-    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    def _shape_and_width(self, places: Places, voxels: Mask) -> tuple[Array, Array]:
         """The profile g and its A (m) at the marked voxels (n,); compiled, as a large grid has millions."""
         return _core.depth_profile(
             voxels,
@@ -212,21 +212,3 @@ class DepthProfile:
             width=self._width,
             flatness=FLATNESS,
         )
-
-
-def _deviation(
-    height: NDArray[np.float64],
-    lateral: NDArray[np.float64],
-    amount: NDArray[np.float32],
-    camera: Camera,
-    domain: Domain,
-    axis: SmokeAxis,
-) -> NDArray[np.float64]:
-    """Standard deviation (m) in depth of the pixels' smoke (rows, columns); its middles are at heights and laterals."""
-    if axis.several:
-        across = axis.read(axis.widths, height, lateral)
-    else:
-        across = MIN_SPREAD_BIAS * smallest_spread(amount, camera, domain).read(height, lateral)
-    behind = LASTING_DISTANCE * axis.read(axis.spreads, height, lateral)
-    spread = np.sqrt(across * ball_spread(amount, camera, domain) + behind**2)
-    return np.asarray(np.maximum(spread, domain.voxel_size))

@@ -2,7 +2,7 @@
 
 The smooth density of `RoundDepth` is the mean of all smokes that show one picture: from the side, a spindle without
 detail. A plausible smoke shows from every side what the clip shows from the front: not one of its pictures, but the
-distribution of their patches (`texture`). Noise breaks the spindle's symmetry (`detail_noise`). Then, from coarse
+distribution of their patches (`texture`). Noise breaks the spindle's symmetry (`lattice_noise`). Then, from coarse
 to fine, pictures of the smoke from many azimuths are moved towards that distribution, and the smoke is scaled along
 their rays to follow. The rows of every picture keep the amounts of the smooth density. After each round the smoke is
 sharpened, by as much as its sides lack of the clip's finest detail, and the cameras' pictures have their turn. Smoke
@@ -21,14 +21,12 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from smokelift.density.depth_prior import DepthEstimate, RoundDepth
-from smokelift.density.detail_noise import stretched_noise
-from smokelift.density.lattice_noise import SMALLEST_BLUR
-from smokelift.density.levels import TINY, Level
+from smokelift.density.lattice_noise import SMALLEST_BLUR, Wander, stretched_noise
 from smokelift.density.multiplicative import fit_multiplicative, take_turns
+from smokelift.density.objective import TINY, Level
 from smokelift.density.observation import ObservedClip, ViewSet
 from smokelift.density.texture import ClipTexture, Exemplar, Picture, enlarged, fine_energy
 from smokelift.density.turntable import Turntable, UprightSmoke
-from smokelift.density.wander import Wander
 from smokelift.render import Volume
 from smokelift.scene import Camera
 from smokelift.scene.domain import box_around

@@ -17,7 +17,7 @@ from typing import Protocol
 import numpy as np
 
 from smokelift.density.depth_prior import DepthEstimate
-from smokelift.density.levels import TINY
+from smokelift.density.objective import TINY
 from smokelift.render import Volume
 
 MAX_ADVECTED_GAIN = 1.5

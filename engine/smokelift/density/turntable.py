@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import smokelift._core as _core
-from smokelift.checks import Doubles
+from smokelift.checks import Array, Doubles
 from smokelift.density.upright_plane import seen_at, view_frame
 from smokelift.scene import Camera, Domain, as_matrix
 
@@ -74,7 +74,7 @@ class Turntable:
         back = np.array(camera.matrix)[:3, 2]
         return float(np.degrees(np.arctan2(back @ self.lateral, -(back @ self.depth))))
 
-    def screen(self, picture: NDArray[np.float32], camera: Camera) -> Picture:
+    def screen(self, picture: Array, camera: Camera) -> Picture:
         """Put a camera's picture (rows, columns) on the screen; zero where it shows nothing."""
         columns, voxels = self.shape
         h = self.domain.voxel_size

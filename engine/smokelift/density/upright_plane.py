@@ -10,10 +10,9 @@ from functools import lru_cache
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 
-from smokelift.checks import Doubles
+from smokelift.checks import Array, Doubles, Mask
 from smokelift.scene import Camera, Domain
 from smokelift.scene.camera import project_points, ray_through_pixels
 
@@ -48,7 +47,7 @@ class PlaneRays(NamedTuple):
 
     near: Doubles
     far: Doubles
-    missed: NDArray[np.bool_]
+    missed: Mask
     height: Doubles
     lateral: Doubles
     rise: Doubles
@@ -116,18 +115,14 @@ class PlanePicture:
 
 
 def read_linearly(
-    values: Doubles,
-    rows: Doubles,
-    columns: Doubles,
-    heights: Doubles,
-    laterals: Doubles | float,
+    values: Doubles, rows: Doubles, columns: Doubles, heights: Doubles, laterals: Doubles | float
 ) -> Doubles:
     """Values (n, m) at heights (n,) and laterals (m,), read linearly at others; the nearest beyond the ends."""
     at = np.interp(heights, rows, np.arange(len(rows))), np.interp(laterals, columns, np.arange(len(columns)))
     return np.asarray(ndimage.map_coordinates(values, np.broadcast_arrays(*at), order=1, mode="nearest"))
 
 
-def on_upright_plane(amount: NDArray[np.float32], camera: Camera, domain: Domain, per_voxel: int) -> PlanePicture:
+def on_upright_plane(amount: Array, camera: Camera, domain: Domain, per_voxel: int) -> PlanePicture:
     """Put a picture (rows, columns) on the upright plane, ``per_voxel`` rows to a voxel and one column."""
     lateral, depth, height = view_frame(camera)
     center = np.array(domain.centre)
@@ -141,7 +136,7 @@ def on_upright_plane(amount: NDArray[np.float32], camera: Camera, domain: Domain
     return PlanePicture(up, across, seen_at(points, amount, camera))
 
 
-def seen_at(points: Doubles, picture: NDArray[np.float32], camera: Camera) -> Doubles:
+def seen_at(points: Doubles, picture: Array, camera: Camera) -> Doubles:
     """What a picture (rows, columns) shows at points (..., 3), in meters; zero outside and behind the camera."""
     pixels, distance = project_points(camera, points)
     at = pixels[..., 1] - 0.5, pixels[..., 0] - 0.5

@@ -21,7 +21,7 @@ from smokelift.checks import Mask
 from smokelift.direct.state import SmokeState
 from smokelift.scene.domain import box_around
 from smokelift.transport import Array, advect, faces_in
-from smokelift.transport.constraint import FaceMasks, faces_of
+from smokelift.transport.pressure import FaceMasks, faces_of
 from smokelift.velocity.linearization import SMOKE_THRESHOLD
 
 BLUR_VOXELS = 2.0

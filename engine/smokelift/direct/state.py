@@ -8,7 +8,7 @@ import numpy as np
 from smokelift.checks import Mask
 from smokelift.output.sequence import Sequence
 from smokelift.transport import Array, Velocity, advect, divergence, on_faces, project
-from smokelift.transport.constraint import project_with_given_faces
+from smokelift.transport.pressure import project_with_given_faces
 
 Mix = Callable[[Array, Array, float], Array]
 """Mixes two densities or emissions by a fraction: 0 gives the first."""

@@ -13,7 +13,7 @@ from smokelift.direct.turbulence import Turbulence
 from smokelift.scene import Box, Domain
 from smokelift.scene.checks import Vector
 from smokelift.transport import Array, Faces, Velocity, divergence, outflow
-from smokelift.transport.constraint import FaceMasks, faces_between, faces_of, project_with_given_faces
+from smokelift.transport.pressure import FaceMasks, faces_between, faces_of, project_with_given_faces
 
 RISE_SECONDS = 0.5
 """Seconds in which the air takes on most (1 - 1/e) of a wind that sets in: a gust, and not a blow."""

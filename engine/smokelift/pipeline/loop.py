@@ -26,8 +26,8 @@ from smokelift.render.device import products_on_one_thread
 from smokelift.setup.shot import Shot
 from smokelift.transport import Array, Velocity
 from smokelift.velocity.estimator import DensityPair
-from smokelift.velocity.near_smoke import advect_near, refine_near_smoke
 from smokelift.velocity.optical_flow import PicturePair
+from smokelift.velocity.pyramid import advect_near, refine_near_smoke
 
 
 @dataclass(frozen=True, eq=False)

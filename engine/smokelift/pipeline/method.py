@@ -5,8 +5,7 @@ The default and the paper's method are two compositions; an ablation is a third,
 
 from dataclasses import dataclass
 
-from smokelift.baselines.density import AllCarried, FixedRateDescent, OrthogonalCopy
-from smokelift.baselines.velocity import PaperVelocity
+from smokelift.baselines.paper_method import AllCarried, FixedRateDescent, OrthogonalCopy, PaperVelocity
 from smokelift.checks import require_kind
 from smokelift.density import (
     AdvectedDetail,

@@ -1,10 +1,10 @@
 """The differentiable renderer: a density and a scene in, an image out, and the exact derivative back.
 
     Scene -> Optics     domain, medium, lights, scattering           image
-      lights            all as directional and point lights          image, environment
+      lights            all as directional and point lights          environment
     Optics -> Renderer  one camera before one background             renderer
-      RenderPlan        rays and light sweeps in voxel coordinates   plan, camera_rays, light_sweeps
-      Backend           light to every voxel, then along the rays    cpu_backend (cpp/) or gpu/ (Taichi), by device
+      RenderPlan        rays and light sweeps in voxel coordinates   plan
+      Backend           light to every voxel, then along the rays    cpu_backend (cpp/) or gpu_backend, by device
 
 `render` and `render_gradient` go all the way from a density and a scene (``image``).
 """

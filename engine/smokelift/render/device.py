@@ -19,10 +19,7 @@ from threadpoolctl import ThreadpoolController
 
 DeviceName = Literal["auto", "cpu", "gpu"]
 
-_DRIVERS = {
-    "linux": ("libcuda.so.1", "libvulkan.so.1"),
-    "win32": ("nvcuda.dll", "vulkan-1.dll"),
-}
+_DRIVERS = {"linux": ("libcuda.so.1", "libvulkan.so.1"), "win32": ("nvcuda.dll", "vulkan-1.dll")}
 """Libraries of which one is there where Taichi can use a GPU; macOS always has Metal."""
 
 _running: str | None = None  # one device a process

@@ -2,7 +2,7 @@
 
     L = integral of T(s) e(s) ds,   T(s) the transmittance of the smoke before s,
 
-on the samples of `smokelift.render.camera_rays`, where the renderer's are: a sample stands for a step of length d with
+on the samples of `smokelift.render.plan`, where the renderer's are: a sample stands for a step of length d with
 constant extinction kappa and emission e, which adds e (1 - exp(-kappa d)) / kappa to what reaches it. Emission is
 linear in the picture, so that a matrix says all of it.
 """
@@ -12,12 +12,11 @@ from dataclasses import replace
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage, sparse
 
-from smokelift.checks import Mask
-from smokelift.render.camera_rays import BAND, camera_rays
+from smokelift.checks import Doubles, Indices, Mask
 from smokelift.render.image import LARGEST_DEPTH
+from smokelift.render.plan import BAND, camera_rays
 from smokelift.render.renderer import Image, Optics, Volume
 from smokelift.scene import Camera
 from smokelift.scene.domain import LATERAL, box_around
@@ -60,8 +59,8 @@ def emission_matrix(density: Volume, camera: Camera, optics: Optics, pixels: Mas
 
 
 def _samples(
-    density: Volume, camera: Camera, optics: Optics, pixels: NDArray[np.intp], burning: Mask
-) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float64]]]:
+    density: Volume, camera: Camera, optics: Optics, pixels: Indices, burning: Mask
+) -> Iterator[tuple[Indices, Indices, Doubles]]:
     """Which of the pixels (n,) have a ray that crosses a plane, the four voxels (4, n) around, and their weights (m).
 
     Plane by plane from the camera on, as far as voxels (nx, ny, nz) burn. Voxels are numbers in a volume with a border

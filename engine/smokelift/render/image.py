@@ -1,10 +1,6 @@
-"""The picture of a scene: the renderer's two public functions, a scene's optics, and how many lights it needs.
-
-The functions are a density as a camera sees it, and how far it is from a target.
-"""
+"""The picture of a scene: a density as a camera sees it, and how far it is from a target."""
 
 from collections.abc import Sequence
-from functools import lru_cache
 from typing import overload
 
 import numpy as np
@@ -12,41 +8,12 @@ import numpy.typing as npt
 
 from smokelift.checks import numbers, radiance, require_kind
 from smokelift.extraction.given_background import background_picture
-from smokelift.render.environment import EnvironmentCells
+from smokelift.render.environment import sampled_lights
 from smokelift.render.renderer import Image, Optics, Renderer, Volume
-from smokelift.scene import (
-    Camera,
-    CompleteScene,
-    DirectionalLight,
-    Domain,
-    EnvironmentLight,
-    FiniteLight,
-    Medium,
-    Scene,
-    completed,
-    require_scene,
-)
-from smokelift.scene.camera import voxel_width
+from smokelift.scene import Camera, CompleteScene, Scene, completed, require_scene
 
 LARGEST_DEPTH = 1e20
 """Optical depth of a voxel, at most: that of a ray through thousands of them is still a number of 32 bits."""
-
-MIN_LIGHTS, MAX_LIGHTS = 4, 256
-"""Numbers of lights that `environment_count` chooses between (docs/experiments/renderer-agreement.md)."""
-
-TOLERANCE = 0.01
-"""Relative L2 change of the picture at which lights are enough. Single scattering at a voxel a step is itself good to a
-few tenths of a percent, and one code value of an 8-bit picture is half a percent of middle gray
-(docs/experiments/renderer-agreement.md)."""
-
-REFERENCE_VOXELS = 28
-"""Voxels along the longest edge of the smoke that the number is chosen with: enough for its lumps, and quick."""
-
-REFERENCE_PIXELS = 96
-"""Pixels along the longer side of its picture, at most."""
-
-REFERENCE_DEPTH = 3.0
-"""Optical depth through its thickest part: dense enough for shadows, thin enough to be lit on all sides."""
 
 
 def render(density: Volume, scene: Scene, camera: Camera | None = None) -> Image:
@@ -99,10 +66,7 @@ def render_gradient(
     density: Volume, scene: Scene, target: Sequence[Image], camera: Sequence[Camera]
 ) -> tuple[float, Volume, list[Image]]: ...
 def render_gradient(
-    density: Volume,
-    scene: Scene,
-    target: Image | Sequence[Image],
-    camera: Camera | Sequence[Camera] | None = None,
+    density: Volume, scene: Scene, target: Image | Sequence[Image], camera: Camera | Sequence[Camera] | None = None
 ) -> tuple[float, Volume, Image | list[Image]]:
     """Squared difference between the rendered and a target image, with its exact derivative.
 
@@ -205,63 +169,3 @@ def scene_renderer(scene: CompleteScene, camera: Camera | None = None, backgroun
         raise ValueError("The camera moves; give the one of a frame, camera.at(frame).")
     behind = background_picture(scene, view) if background is None else background
     return scene_optics(scene).renderer(view, behind)
-
-
-def sampled_lights(scene: CompleteScene) -> tuple[FiniteLight, ...]:
-    """The lights of a scene, in which an environment has become as many parallel lights as it needs.
-
-    That number is found with the scene's own camera, where it is in the first frame. It is the same for every other
-    camera and frame, so that a sequence is lit alike from all sides.
-    """
-    lights: list[FiniteLight] = []
-    for light in scene.lights:
-        if isinstance(light, EnvironmentLight):
-            lights += _environment(light, scene.camera.at(0), scene.domain, scene.medium)
-        else:
-            lights += light.samples()
-    return tuple(lights)
-
-
-@lru_cache(maxsize=4)
-def _environment(
-    light: EnvironmentLight, camera: Camera, domain: Domain, medium: Medium
-) -> tuple[DirectionalLight, ...]:
-    return EnvironmentCells(light).lights(light.directions or environment_count(light, camera, domain, medium))
-
-
-def environment_count(light: EnvironmentLight, camera: Camera, domain: Domain, medium: Medium) -> int:
-    """Choose the number of lights for an environment by convergence.
-
-    A ball of lumps and hollows that fills the domain is rendered in the medium before black with 4, 8, 16, ... lights,
-    until doubling their number changes the picture by at most `TOLERANCE`, or the number is 256. Under six kinds of
-    surroundings, a plume then came within 0.2 to 1.3 % of its picture with 512 lights
-    (docs/experiments/renderer-agreement.md).
-    """
-    voxel = max(domain.size) / REFERENCE_VOXELS
-    x, y, z = (max(round(edge / voxel), 1) for edge in domain.size)
-    small, (width, height) = domain.about_center((x, y, z), voxel), camera.size
-    # pixels about as wide as voxels at the domain's center
-    shrink = max(1.0, voxel_width(camera, small), max(width, height) / REFERENCE_PIXELS)
-    view = camera.resized(max(1, round(width / shrink)), max(1, round(height / shrink)))
-    ball = _reference_density(small, medium)
-    cells = EnvironmentCells(light)
-
-    def picture(lights: int) -> Image:
-        return Optics(small, medium, cells.lights(lights)).renderer(view, np.zeros(3, np.float32)).image(ball)
-
-    count, image = MIN_LIGHTS, picture(MIN_LIGHTS)
-    while count < MAX_LIGHTS:
-        finer = picture(2 * count)
-        if np.linalg.norm(finer - image) <= TOLERANCE * np.linalg.norm(finer):
-            break
-        count, image = 2 * count, finer
-    return count
-
-
-def _reference_density(domain: Domain, medium: Medium) -> Volume:
-    """A ball of lumps and hollows that fills the domain, of optical depth 3 through its thickest part."""
-    x, y, z = np.meshgrid(*((2 * np.arange(n) + 1) / n - 1 for n in domain.resolution), indexing="ij")
-    lumps = np.maximum(1 + 4 * np.sin(9 * x) * np.sin(8 * y + 1) * np.sin(7 * z + 2), 0)
-    ball = np.maximum(1 - (x * x + y * y + z * z), 0) * lumps
-    thickest = domain.voxel_size * min(ball.sum(axis).max() for axis in range(3))
-    return np.asarray(ball * REFERENCE_DEPTH / (medium.extinction * thickest), np.float32)

@@ -15,17 +15,16 @@ from typing import TYPE_CHECKING, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from smokelift.checks import Doubles, Mask
 from smokelift.render import device
-from smokelift.render.camera_rays import camera_rays
 from smokelift.render.cpu_backend import CpuBackend
 from smokelift.render.device import products_on_one_thread
-from smokelift.render.light_sweeps import light_sweeps
-from smokelift.render.plan import RenderPlan, to_eye
+from smokelift.render.plan import RenderPlan, camera_rays, light_sweeps, to_eye
 from smokelift.scene import SHADOWED, Camera, Domain, FiniteLight, Medium, PointLight, Scattering
 from smokelift.scene.domain import box_around
 
 if TYPE_CHECKING:
-    from smokelift.render.gpu.backend import GpuBackend
+    from smokelift.render.gpu_backend import GpuBackend
 
 Image = NDArray[np.float32]
 Volume = NDArray[np.float32]
@@ -44,11 +43,11 @@ class Optics:
     """``"multiple"``: of all orders, isotropic smoke only; ``"single"``, with self-shadowing; ``"unshadowed"``: light
     reaches every voxel unattenuated; or ``"absorption"``: the background attenuated, nothing else."""
 
-    def renderer(self, camera: Camera, background: Image, support: NDArray[np.bool_] | None = None) -> Renderer:
+    def renderer(self, camera: Camera, background: Image, support: Mask | None = None) -> Renderer:
         """The renderer of a camera before a background; see `Renderer` for the parameters."""
         return Renderer(self, camera, background, support)
 
-    def plan(self, camera: Camera, support: NDArray[np.bool_] | None = None) -> RenderPlan:
+    def plan(self, camera: Camera, support: Mask | None = None) -> RenderPlan:
         """Plan the rendering for a camera; see `Renderer` for the support."""
         scattering, medium = self.scattering, self.medium
         if scattering not in get_args(Scattering):
@@ -80,7 +79,7 @@ class Optics:
             diffuse=scattering == "multiple" and len(color) > 0,
         )
 
-    def unshadowed_source(self) -> NDArray[np.float64]:
+    def unshadowed_source(self) -> Doubles:
         """Source radiance (3,), W/m^2/sr, of isotropic smoke in the middle of the domain, with nothing before it.
 
         Light that is scattered many times raises it as it raises that of the surface of a half-space, on the mean over
@@ -107,9 +106,7 @@ class Renderer:
     point light stands inside the domain, or anisotropic smoke is to scatter many times.
     """
 
-    def __init__(
-        self, optics: Optics, camera: Camera, background: Image, support: NDArray[np.bool_] | None = None
-    ) -> None:
+    def __init__(self, optics: Optics, camera: Camera, background: Image, support: Mask | None = None) -> None:
         self.optics, self.camera = optics, camera
         plan = optics.plan(camera, support)
         self._background = np.asarray(background, np.float32)
@@ -158,6 +155,6 @@ def _backend(plan: RenderPlan) -> CpuBackend | GpuBackend:
     """What renders a plan on the device of this process."""
     if device.start() == "cpu":
         return CpuBackend(plan)
-    from smokelift.render.gpu.backend import GpuBackend  # here, because Taichi takes long to import
+    from smokelift.render.gpu_backend import GpuBackend  # here, because Taichi takes long to import
 
     return GpuBackend(plan)

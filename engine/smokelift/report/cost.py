@@ -20,7 +20,7 @@ import psutil
 import scipy.fft
 
 from smokelift.density import RoundDepth, ViewSet
-from smokelift.density.levels import MIN_COARSENED_VOXELS
+from smokelift.density.objective import MIN_COARSENED_VOXELS
 from smokelift.setup.first_estimate import SAMPLE_FRAMES
 from smokelift.setup.geometry import Shape, proportional
 from smokelift.setup.settings import Settings

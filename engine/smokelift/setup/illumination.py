@@ -23,7 +23,7 @@ from smokelift.extraction.matte import CLIPPED_VALUE, MIN_COLORED_VALUE
 from smokelift.footage.images import Picture, brightest_channel, channel_mean, reduced_size
 from smokelift.footage.noise import Noise
 from smokelift.render import scene_optics
-from smokelift.render.image import environment_count
+from smokelift.render.environment import environment_count
 from smokelift.scene import (
     SCATTERINGS,
     SHADOWED,

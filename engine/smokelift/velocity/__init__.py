@@ -11,12 +11,12 @@ subject to div u = 0, over velocities u on voxel faces, in voxels per frame, wit
     g = grad (after(x) + before(x - u_k(x))) / 2s
     s = root mean square of |grad| inside the smoke
     W = 0 where smoke is known to enter, else 1
-    u_p = t prediction + P(momentum)              both fitted with a few numbers (`momentum`)
+    u_p = t prediction + P(momentum)              both fitted with a few numbers (`fit_center`)
     R(v) = k (smoothness * sum |grad curl v|^2 + kinetic * sum |v|^2)
 
 on one grid after a prediction, which is coarse in a reconstruction; else from a coarse grid to the one that is asked
 for (`coarse_to_fine`). It is linearized anew after the first solve (`linearization`). Before and after are as
-`preparation` makes them. Division by s makes every weight independent of the scales of density, space and time. k is
+`prepare` makes them. Division by s makes every weight independent of the scales of density, space and time. k is
 `UNEXPLAINED` over the fraction of the change that u_p leaves unexplained: it grows as u_p gets better.
 
 Sources: Cen, Zhang, Liang (2023), Entropy 25, 1348, section 3.3; Eckert et al. (2019), ACM TOG 38(6), 239 (ScalarFlow).
@@ -27,12 +27,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from smokelift.checks import require_kind
+from smokelift.checks import Mask, require_kind
 from smokelift.scene import Side
 from smokelift.transport import Velocity
 from smokelift.velocity.coarse_to_fine import CoarseToFine, VelocitySettings
-from smokelift.velocity.estimator import DensityPair, VelocityEstimator, predict_velocity, refine
+from smokelift.velocity.estimator import DensityPair, VelocityEstimator, predict_velocity
 from smokelift.velocity.optical_flow import PicturePair
+from smokelift.velocity.pyramid import refine
 from smokelift.velocity.solver import PrimalDual, ProjectedCG, Solver
 
 
@@ -44,7 +45,7 @@ def estimate_velocity(
     settings: VelocitySettings | None = None,
     *,
     closed: tuple[Side, ...] = (),
-    inflow: npt.NDArray[np.bool_] | None = None,
+    inflow: Mask | None = None,
     prediction: Velocity | None = None,
 ) -> Velocity:
     """Estimate the velocity that carries one density into the next.

@@ -8,12 +8,17 @@ import numpy as np
 from smokelift.checks import require_kind
 from smokelift.scene.checks import integer
 from smokelift.transport import Array, StaggeredGrid, Velocity, require_same_shape, without_divergence
-from smokelift.velocity.estimator import DensityPair, in_meters, motion_weight, predict_velocity, refine
-from smokelift.velocity.linearization import SMOKE_THRESHOLD, least_squares, linearize
-from smokelift.velocity.momentum import fit_center
+from smokelift.velocity.estimator import DensityPair, in_meters, motion_weight, predict_velocity
+from smokelift.velocity.linearization import (
+    SMOKE_THRESHOLD,
+    PreparedPair,
+    fit_center,
+    least_squares,
+    linearize,
+    prepare,
+)
 from smokelift.velocity.optical_flow import PicturePair, correct_by_optical_flow
-from smokelift.velocity.preparation import PreparedPair, prepare
-from smokelift.velocity.pyramid import coarsen_density, coarsen_velocity, default_coarsening, smooth_velocity
+from smokelift.velocity.pyramid import coarsen_density, coarsen_velocity, default_coarsening, refine, smooth_velocity
 from smokelift.velocity.solver import ProjectedCG, Solver
 
 ONE_VIEW_SMOOTHNESS = 10.0
@@ -120,7 +125,24 @@ def _found(pair: DensityPair, given: Velocity | None, settings: VelocitySettings
         coarse = _found(_half(pair), None, settings)
         start = None if coarse is None else refine(coarse, (x, y, z)).displacement(pair.dt)
     u = StaggeredGrid.zero(shape, 1.0, pair.closed) if start is None else start
-    return _solved(pair, prepared, weight, u, prediction, settings)
+    effort: Counter[str] = Counter()
+    for _ in range(settings.linearizations):
+        linear = linearize(prepared.before, prepared.after, weight, u)
+        if linear is None:
+            return None
+        center, trust, dissipation = fit_center(prediction, prepared.after, linear, u)
+        linear = linear.with_dissipation(dissipation)
+        unexplained, _ = linear.unexplained(center, prepared.noise)
+        scale = UNEXPLAINED / max(unexplained, MIN_UNEXPLAINED)
+        smoothness, kinetic = scale * settings.smoothness, scale * KINETIC
+        problem = least_squares(linear, center, second_order=smoothness, kinetic=kinetic, irrotational=IRROTATIONAL)
+        start = u if any(component.any() for component in u.faces) else center
+        del linear  # the solver takes most of the memory
+        solution, solved = settings.solver.solve(problem, start)
+        effort.update({name: solved[name] for name in ("iterations", "products", "projections")})
+        u = _clamped(solution, u)
+    found = {"residual": solved["residual"], "unexplained": unexplained, "trust": trust}
+    return in_meters(u, pair, {**effort, **found, "dissipation": prepared.density_dissipation(dissipation)})
 
 
 def _half(pair: DensityPair) -> DensityPair:
@@ -145,46 +167,6 @@ def _usable_prediction(
     change = (prepared.after - prepared.before) / np.float32(linear.scale)
     usable = unexplained < MAX_UNEXPLAINED and rest < float(np.sum(linear.weight * change**2, dtype=np.float64))
     return u if usable else None
-
-
-def _solved(
-    pair: DensityPair,
-    prepared: PreparedPair,
-    weight: Array,
-    u: StaggeredGrid,
-    prediction: StaggeredGrid | None,
-    settings: VelocitySettings,
-) -> Velocity | None:
-    """The estimate on one grid, linearized around `u` first; None where there is no structure to follow."""
-    effort: Counter[str] = Counter()
-    for _ in range(settings.linearizations):
-        linear = linearize(prepared.before, prepared.after, weight, u)
-        if linear is None:
-            return None
-        center = fit_center(prediction, prepared.after, linear, u)
-        linear = linear.with_dissipation(center.dissipation)
-        unexplained, _ = linear.unexplained(center.motion, prepared.noise)
-        scale = UNEXPLAINED / max(unexplained, MIN_UNEXPLAINED)
-        problem = least_squares(
-            linear,
-            center.motion,
-            second_order=scale * settings.smoothness,
-            kinetic=scale * KINETIC,
-            irrotational=IRROTATIONAL,
-        )
-        start = u if any(component.any() for component in u.faces) else center.motion
-        del linear  # the solver takes most of the memory
-        solution, solved = settings.solver.solve(problem, start)
-        effort.update({name: solved[name] for name in ("iterations", "products", "projections")})
-        u = _clamped(solution, u)
-    figures = {
-        **effort,
-        "residual": solved["residual"],
-        "unexplained": unexplained,
-        "trust": center.trust,
-        "dissipation": prepared.density_dissipation(center.dissipation),
-    }
-    return in_meters(u, pair, figures)
 
 
 def _clamped(solution: StaggeredGrid, u: StaggeredGrid) -> StaggeredGrid:

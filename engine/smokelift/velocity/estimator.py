@@ -16,22 +16,15 @@ from smokelift.transport import (
     Array,
     StaggeredGrid,
     Velocity,
-    VoxelBox,
     advect,
-    halved,
-    part_of,
     project,
     require_positive,
     require_same_shape,
     without_divergence,
 )
 from smokelift.velocity.optical_flow import PicturePair
-from smokelift.velocity.pyramid import prolong
 
 Density = npt.NDArray[np.floating[Any]]
-
-REACH = 1
-"""Coarse voxels around a box that its fine velocity depends on; see `prolong`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,36 +89,6 @@ class VelocityEstimator(Protocol):
 def predict_velocity(velocity: Velocity, dt: float) -> Velocity:
     """The velocity after ``dt`` seconds in which no force acts: carried along by itself, then projected."""
     return project(advect(velocity, velocity, dt))
-
-
-def refine(coarse: Velocity, shape: tuple[int, int, int]) -> Velocity:
-    """A velocity refined to the grid (shape) that its own was halved from; itself if it is on that already.
-
-    It has no divergence there.
-    """
-    if coarse.shape == shape:
-        return coarse
-    x, y, z = (slice(0, count) for count in shape)
-    return refine_in_box(coarse, shape, (x, y, z))
-
-
-def refine_in_box(coarse: Velocity, shape: tuple[int, int, int], box: VoxelBox) -> Velocity:
-    """What `refine` gives in a box of its voxels, as the velocity of a box of its own."""
-    if coarse.shape == shape:
-        return part_of(coarse, box)
-    half = halved(shape)
-    x, y, z = (
-        slice(max(side.start // 2 - REACH, 0), min((side.stop + 1) // 2 + REACH, count))
-        for side, count in zip(box, half, strict=True)
-    )
-    part = refine_in_box(coarse, half, (x, y, z))
-    counts = tuple(min(2 * side.stop, end) - 2 * side.start for side, end in zip((x, y, z), shape, strict=True))
-    fine = Velocity(prolong(part, counts), part.voxel_size / 2, part.closed, figures=part.figures)
-    i, j, k = (
-        slice(inner.start - 2 * outer.start, inner.stop - 2 * outer.start)
-        for inner, outer in zip(box, (x, y, z), strict=True)
-    )
-    return part_of(fine, (i, j, k))
 
 
 def in_meters(u: StaggeredGrid, pair: DensityPair, figures: Mapping[str, float]) -> Velocity:

@@ -18,11 +18,11 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import ndimage, sparse
 from scipy.sparse.linalg import cg
 
-from smokelift.checks import Array
+from smokelift.checks import Array, Doubles
 from smokelift.scene import Camera, Domain
 from smokelift.scene.camera import project_points
 from smokelift.transport import Velocity, on_faces, without_divergence
@@ -87,7 +87,7 @@ def averaged_along(velocity: Velocity, line: ArrayLike) -> Velocity:
     return velocity.with_faces(without_divergence(velocity.with_faces(means))[0].faces)
 
 
-def _line(direction: NDArray[np.float64], deviation: float) -> Array:
+def _line(direction: Doubles, deviation: float) -> Array:
     """A Gaussian of so many voxels on a line through the middle of a box: eight voxels share every point."""
     ends = int(np.ceil(REACH * deviation))
     along = np.arange(-ends, ends + 1)
@@ -101,7 +101,7 @@ def _line(direction: NDArray[np.float64], deviation: float) -> Array:
     return np.asarray(kernel / kernel.sum(), np.float32)
 
 
-def _correction(image: "_ImageGrid", motion: NDArray[np.float64], pictures: PicturePair) -> Array:
+def _correction(image: "_ImageGrid", motion: Doubles, pictures: PicturePair) -> Array:
     """What the motion (cells, 2) of the picture lacks, in columns and rows per frame."""
     before, after = pictures.before, pictures.after
     smoke = after.ravel() > 0
@@ -132,10 +132,10 @@ class _ImageGrid:
     pixels: sparse.csr_matrix
     voxels: sparse.csr_matrix
     """Bilinear weights of the cells at every pixel and at every voxel's center."""
-    moved: NDArray[np.float64]
+    moved: Doubles
     """(voxels, 2, 3): columns and rows that a voxel moves by in the picture for each voxel that it moves in the
     grid."""
-    least: NDArray[np.float64]
+    least: Doubles
     """(voxels, 3, 2): the least motion in the grid for each column and row."""
     penalty: sparse.csr_matrix
     """What a correction costs beside what it explains."""
@@ -165,7 +165,7 @@ class _ImageGrid:
         penalty *= sizes[0] * sizes[1]
         return _ImageGrid(shape, pixels, voxels, moved, np.linalg.pinv(moved), penalty.tocsr())
 
-    def mean_motion(self, motion: Array, density: Array) -> NDArray[np.float64]:
+    def mean_motion(self, motion: Array, density: Array) -> Doubles:
         """Mean along the rays (cells, 2), in columns and rows per frame, of a motion (nx, ny, nz, 3) in voxels."""
         weight = density.ravel() + OUTSIDE_WEIGHT * float(density.max()) + np.finfo(np.float32).tiny
         across = np.einsum("nij,nj->ni", self.moved, motion.reshape(-1, 3))
@@ -178,7 +178,7 @@ class _ImageGrid:
         return np.asarray(np.einsum("nij,nj->ni", self.least, seen).reshape(*self.shape, 3), np.float32)
 
 
-def _bilinear(rows: NDArray[np.float64], columns: NDArray[np.float64], counts: tuple[int, int]) -> sparse.csr_matrix:
+def _bilinear(rows: Doubles, columns: Doubles, counts: tuple[int, int]) -> sparse.csr_matrix:
     """Weights (points, cells) that interpolate between cells; beyond the last it goes on as there."""
     low, weights = [], []
     for places, count in ((rows, counts[0]), (columns, counts[1])):

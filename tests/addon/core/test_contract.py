@@ -11,8 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from addon.core import contract
-from addon.core.image_sequence import ImageSequence, image_sequence_from
-from addon.core.retiming import retiming
+from addon.core.contract import ImageSequence, image_sequence_from, retiming
 from addon.core.take import toml_text
 from extension_products import NAMED, PLATFORMS, Product
 from smokelift.app.cli import command_parser
@@ -144,15 +143,14 @@ LONGEST_EXPRESSION = 256
 @pytest.mark.parametrize("speeds", [(1.0,), (0.25,), (3.0,), (1.0, 0.2, 1.0), (0.5, 0.5, 2.0), (2.0, 1.0)])
 def test_places_and_speeds_are_the_engines(speeds) -> None:
     count = 41
-    pace = retiming(count, speeds)
+    pace = retiming(count, speeds, "t")
     places, wanted = playback(count, speeds)
     for time, (place, speed) in enumerate(zip(places, wanted, strict=True)):
-        found = [eval(text("t"), {"t": time, "exp": math.exp}) for text in (pace.place, pace.speed)]
+        found = [eval(text, {"t": time, "exp": math.exp}) for text in (pace.place, pace.speed)]
         np.testing.assert_allclose(found, (place, speed), rtol=2e-3, atol=2e-3)
     assert len(places) - 1 <= pace.duration <= len(places) + 1 / speeds[-1]
 
 
 def test_an_expression_is_short_enough_for_blender() -> None:
-    pace = retiming(1234, (0.123456789, 1.23456789, 0.987654321))
-    time = "(frame-1234+0.001)/1.23456789"
-    assert len(f"floor(min({pace.place(time)},1233))-(frame-1234)+1234") < LONGEST_EXPRESSION
+    pace = retiming(1234, (0.123456789, 1.23456789, 0.987654321), "(frame-1234+0.001)/1.23456789")
+    assert len(f"floor(min({pace.place},1233))-(frame-1234)+1234") < LONGEST_EXPRESSION

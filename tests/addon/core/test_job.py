@@ -58,7 +58,6 @@ while True:
 
 @pytest.fixture
 def log(tmp_path) -> Path:
-    """Where jobs keep what was said."""
     return tmp_path / "logs" / "job.log"
 
 
@@ -110,7 +109,6 @@ def until(condition: Callable[[], bool]) -> None:
 
 
 def finished(job: Job) -> Job:
-    """Poll a job to its end."""
     if job.outcome == "waiting":
         job.start()
     until(lambda: (job.poll(), job.ended)[1])

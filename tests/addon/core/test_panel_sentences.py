@@ -49,7 +49,6 @@ def test_only_sentences_of_the_panels_own_name_a_command() -> None:
 
 
 def finding(kind: str, **figures: float) -> dict[str, object]:
-    """What the engine says."""
     return {"text": "As it is.", "kind": kind, "figures": figures}
 
 

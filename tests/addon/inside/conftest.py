@@ -19,7 +19,7 @@ from addon.core.take import Take
 from addon.result.smoke_takes import Run, runs
 from smokelift.output.vdb import write_proxy, write_vdb
 from smokelift.scene import Domain, Medium, Scene, scene_to_dict
-from tests.example_shot import EXAMPLE, set_up_example
+from tests.example_shot import EXAMPLE, set_up_example, smoke
 
 # An installed Blender finds the modules that it comes with; USD's importer calls hooks in one of them.
 sys.path += [str(folder) for folder in Path(bpy.utils.resource_path("LOCAL"), "python", "lib").glob("*/site-packages")]
@@ -77,8 +77,12 @@ def shot(scene) -> bpy.types.Scene:
 
 
 @pytest.fixture
+def settings(shot) -> bpy.types.PropertyGroup:
+    return smoke(shot).smokelift
+
+
+@pytest.fixture
 def clip(blender) -> bpy.types.MovieClip:
-    """The example's."""
     return bpy.data.movieclips.load(str(EXAMPLE / "clip.mp4"))
 
 

@@ -71,12 +71,10 @@ def uninstall(name: str) -> None:
 
 
 def size(folder: Path) -> int:
-    """Bytes of all files in a folder."""
     return sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
 
 
 def shown(scene: bpy.types.Scene) -> bpy.types.Object:
-    """The one object that shows smoke."""
     (obj,) = [obj for obj in scene.objects if obj.type == "VOLUME"]
     return obj
 

@@ -45,7 +45,6 @@ def _go_on(steps: Iterator[float]) -> float | None:
 
 
 def first_window() -> bpy.types.Window:
-    """The one that was there first."""
     return bpy.context.window_manager.windows[0]
 
 
@@ -55,17 +54,14 @@ def largest_area(kind: str) -> bpy.types.Area:
 
 
 def of_addon(module: str) -> ModuleType:
-    """A module of the add-on that is enabled."""
     return next(known for name, known in sys.modules.items() if name.endswith(f".smokelift.{module}"))
 
 
 def runs() -> list[Any]:
-    """What runs, waits and has ended."""
     return of_addon("result.smoke_takes").runs
 
 
 def checked() -> bool:
-    """Whether the shot in the tab is checked."""
     return of_addon("result.shot_check").state.done
 
 
@@ -79,7 +75,6 @@ def until(condition: Callable[[], object]) -> Iterator[float]:
 
 
 def region(area: bpy.types.Area, kind: str) -> bpy.types.Region:
-    """A part of an area."""
     return next(region for region in area.regions if region.type == kind)
 
 
@@ -107,14 +102,12 @@ def find(
 
 
 def picture(name: str) -> Iterator[float]:
-    """Take a picture and wait for it."""
     process = shell(take(name))
     while process.poll() is None:
         yield 0.1
 
 
 def take(name: str) -> str:
-    """The command that takes a picture."""
     return f"xwd -root -silent | convert xwd:- {FOLDER}/{name}.png"
 
 
@@ -124,7 +117,6 @@ def shell(command: str) -> subprocess.Popen:
 
 
 def click() -> None:
-    """Press the button under the mouse."""
     shell("xdotool mousedown 1; sleep 0.1; xdotool mouseup 1")
 
 

@@ -11,23 +11,8 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d
 from mathutils import Vector
 
 sys.path.insert(0, str(Path(__file__).parent))
-from artist import (
-    checked,
-    click,
-    find,
-    first_window,
-    largest_area,
-    look_away,
-    perform,
-    picture,
-    place,
-    region,
-    report,
-    runs,
-    shell,
-    take,
-    until,
-)
+import artist
+from artist import click, find, look_away, picture, place, region, report, runs, shell, until
 
 TICK_SECONDS = 0.02
 DRAWINGS = 5
@@ -37,12 +22,14 @@ EYEDROPPER = 0.85
 BASE = Vector((-0.2, 0.4, 0.0))
 """On the floor of the box, 7.4 m from the camera."""
 
+ALONE = ("bl_space_type", "bl_region_type", "bl_category", "bl_label", "needs", "draw")
+"""What a sub-panel has beside its parent."""
+
 SUB_PANELS = ("results", "advanced", "look", "set_up", "direct", "export")
 
 
 def story() -> Iterator[float]:
-    """What the artist does."""
-    window, area = first_window(), largest_area("VIEW_3D")
+    window, area = artist.first_window(), artist.largest_area("VIEW_3D")
     space = area.spaces.active
     space.region_3d.view_perspective = "CAMERA"
     space.shading.type = "SOLID"
@@ -92,7 +79,7 @@ def qualities(window: bpy.types.Window, area: bpy.types.Area) -> Iterator[float]
     chosen, settings.longest_side = settings.longest_side, 0
     region(area, "UI").active_panel_category = "Smokelift"
     area.tag_redraw()
-    yield from until(checked)
+    yield from until(artist.checked)
     yield 1.0
     yield from picture("qualities")
     settings.longest_side = chosen
@@ -116,7 +103,7 @@ def stands(window: bpy.types.Window, area: bpy.types.Area) -> Iterator[float]:
     click()
     yield 1.0
     known, settings.distance = settings.distance, 0.0
-    yield from until(checked)
+    yield from until(artist.checked)
     return known
 
 
@@ -129,18 +116,8 @@ def sub_panels(window: bpy.types.Window, area: bpy.types.Area) -> Iterator[float
     yield 1.0
     for name in SUB_PANELS:
         of_smoke = getattr(bpy.types, f"SMOKELIFT_PT_view_{name}")
-        alone = type(
-            f"SMOKELIFT_PT_alone_{name}",
-            of_smoke.__bases__,
-            {
-                "bl_space_type": "VIEW_3D",
-                "bl_region_type": "UI",
-                "bl_category": "Smokelift",
-                "bl_label": of_smoke.bl_label,
-                "needs": of_smoke.needs,
-                "draw": of_smoke.draw,
-            },
-        )
+        own = {key: getattr(of_smoke, key) for key in ALONE}
+        alone = type(f"SMOKELIFT_PT_alone_{name}", of_smoke.__bases__, own)
         bpy.utils.register_class(alone)
         look_away()
         yield 1.5
@@ -149,7 +126,6 @@ def sub_panels(window: bpy.types.Window, area: bpy.types.Area) -> Iterator[float
 
 
 def volume(window: bpy.types.Window) -> bpy.types.Object:
-    """The smoke."""
     return next(obj for obj in window.scene.objects if obj.type == "VOLUME")
 
 
@@ -160,7 +136,7 @@ def make_smoke(window: bpy.types.Window, area: bpy.types.Area, name: str, comman
     yield from picture(f"{name}_closed")
     sidebar.active_panel_category = "Smokelift"
     area.tag_redraw()
-    yield from until(checked)  # the engine looks at the shot and says what it will take
+    yield from until(artist.checked)  # the engine looks at the shot and says what it will take
     yield 1.0
     yield from picture(f"{name}_idle")
     yield from find(window, area, sidebar, command)
@@ -185,7 +161,7 @@ def make_smoke(window: bpy.types.Window, area: bpy.types.Area, name: str, comman
             seen["progress"].append(job.done)
             seen["playhead"].append(window.scene.frame_current)
             if not half_way and job.done >= job.total // 2 > 0:
-                half_way = shell(take(f"{name}_running"))
+                half_way = shell(artist.take(f"{name}_running"))
         yield 0.05
     seen["seconds"] = round(time.monotonic() - clicked, 2)
     bpy.app.timers.unregister(tick)
@@ -215,4 +191,4 @@ def note_smoke(scene: bpy.types.Scene, drawn: list[float]) -> None:
         drawn.append(time.monotonic())
 
 
-perform(story)
+artist.perform(story)

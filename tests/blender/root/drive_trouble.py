@@ -16,16 +16,8 @@ MODULE = "bl_ext.user_default.smokelift"
 
 
 def story() -> Iterator[float]:
-    """One chapter after the other."""
-    yield from undo()
-    yield from rename()
-    yield from delete()
-    yield from save_elsewhere()
-    yield from stop_with_the_keyboard()
-    yield from queue()
-    yield from fail()
-    yield from disable()
-    yield from close()
+    for chapter in (undo, rename, delete, save_elsewhere, stop_with_the_keyboard, queue, fail, disable, close):
+        yield from chapter()
 
 
 def scene() -> bpy.types.Scene:
@@ -80,7 +72,6 @@ def undo() -> Iterator[float]:
 
 
 def rename() -> Iterator[float]:
-    """Call the smoke and the scene something else."""
     yield from begin()
     scene().name, volumes()[0].name = "Räuchlein", "煙"
     report["rename"] = yield from end()
@@ -100,7 +91,6 @@ def delete() -> Iterator[float]:
 
 
 def save_elsewhere() -> Iterator[float]:
-    """Save the file into another folder."""
     yield from begin()
     other = Path(bpy.data.filepath).parent / "ein anderer Ört"
     other.mkdir()
@@ -170,7 +160,6 @@ def disable() -> Iterator[float]:
 
 
 def close() -> Iterator[float]:
-    """And quit, which ends the story."""
     yield from begin()
     report["last_take"] = str(runs()[-1].take.directory)
 

@@ -8,10 +8,10 @@ import pytest
 
 import smokelift._core as _core
 from smokelift.density import DensitySettings, Observation, ObservedView, reconstruct_density
-from smokelift.density.descent import descend
+from smokelift.density.descent import BLOCK, SHARED, descend
 from smokelift.density.hull import common_hull, project_voxels, visual_hull
 from smokelift.density.multiplicative import fit_multiplicative, take_turns
-from smokelift.density.objective import Term
+from smokelift.density.objective import Fit, Term
 from smokelift.evaluation.metrics import psnr
 from smokelift.extraction.plate import Plate
 from smokelift.footage.images import linear_to_srgb, srgb_to_linear
@@ -188,23 +188,46 @@ def even_start(density: np.ndarray, scene: Scene) -> tuple[Term, np.ndarray, np.
     return replace(term, view=exact), _core.MarkedVoxels(hull), np.where(hull, np.float32(0.02), np.float32(0))
 
 
+def descended(term: Term, hull: _core.MarkedVoxels, start: np.ndarray, steps: int, bound: float = np.inf) -> Fit:
+    """So many steps of descent from a start where no prior says anything."""
+    return descend([term], start.copy(), hull, steps, 0.0, 2, bound=bound, expected=np.ones_like(start))
+
+
 @pytest.mark.parametrize("thickness", [1.0, 30.0])
 def test_descent_never_raises_the_loss(plume, small, thickness) -> None:
     """Each further step leaves the picture as near or nearer, in thick smoke too, where bare steps overshoot."""
     scene = replace(small, medium=replace(small.medium, extinction=thickness * small.medium.extinction))
     term, hull, start = even_start(plume.densities[1], scene)
-    losses = [descend([term], start.copy(), hull, steps, 0.0, 2).loss for steps in range(20)]
+    losses = [descended(term, hull, start, steps).loss for steps in range(20)]
     assert all(after <= before for before, after in itertools.pairwise(losses))
     assert losses[-1] < 0.3 * losses[0]
 
 
 def test_descent_makes_nothing_denser_than_it_may_be(plume, small) -> None:
     term, hull, start = even_start(plume.densities[1], small)
-    free = descend([term], start.copy(), hull, 20, 0.0, 2)
+    free = descended(term, hull, start, 20)
     most = 0.5 * float(free.density.max())
-    bound = descend([term], start.copy(), hull, 20, 0.0, 2, bound=most)
+    bound = descended(term, hull, start, 20, most)
     assert bound.density.max() == pytest.approx(most)
-    assert free.loss < bound.loss < 0.5 * descend([term], start.copy(), hull, 0, 0.0, 2).loss
+    assert free.loss < bound.loss < 0.5 * descended(term, hull, start, 0).loss
+
+
+def test_neighbors_share_a_step() -> None:
+    """What one voxel wants reaches its cube, evenly both ways, and what all want alike stays as it is."""
+    shape, random = (9, 7, 8), np.random.default_rng(5)
+    where = _core.MarkedVoxels(random.random(shape) < 0.7)
+    one, other = random.standard_normal((2, where.count)).astype(np.float32)
+
+    def shared(values: np.ndarray) -> np.ndarray:
+        result = np.empty_like(values)
+        where.smooth_in_cubes(values, BLOCK, SHARED, result)
+        return result
+
+    np.testing.assert_allclose(shared(np.ones_like(one)), 1, rtol=1e-6)
+    np.testing.assert_allclose(one @ shared(other), shared(one) @ other, rtol=1e-4)
+    alone = np.zeros_like(one)
+    alone[0] = 1
+    assert 1 < np.count_nonzero(shared(alone)) < where.count
 
 
 def test_the_figures_are_those_of_the_density(plume, small) -> None:

@@ -9,7 +9,7 @@ import pytest
 from scipy import ndimage
 
 from smokelift import Camera, Clip, Domain, Scene, Settings, Shot, prepare_shot
-from smokelift.density import DensitySettings, DepthPrior, DetailedDepth, GradientFit, RoundDepth, ViewSet, levels
+from smokelift.density import DensitySettings, DepthPrior, DetailedDepth, GradientFit, RoundDepth, ViewSet, objective
 from smokelift.density.synthesis import GAIN, OWN_PICTURE_DEGREES, EveryView, isotropic_filter
 from smokelift.density.turntable import Turntable, UprightSmoke
 
@@ -120,7 +120,7 @@ def test_lobes_are_as_strong_on_every_grid(plume, tmp_path, monkeypatch) -> None
     coarse = lobes(scene, 30)
     assert coarse > 0.15
     assert lobes(scene, 60) == pytest.approx(coarse, rel=0.25)
-    monkeypatch.setattr(levels, "MIN_COARSENED_VOXELS", 10_000)
+    monkeypatch.setattr(objective, "MIN_COARSENED_VOXELS", 10_000)
     assert lobes(scene, 60) == pytest.approx(coarse, rel=0.25)
 
 

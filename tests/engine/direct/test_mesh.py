@@ -13,7 +13,7 @@ from smokelift.direct.surroundings import BoxObstacle, Surroundings, require_pla
 from smokelift.output.index import SequenceError
 from smokelift.output.sequence import Sequence
 from smokelift.transport import divergence
-from smokelift.transport.constraint import faces_between
+from smokelift.transport.pressure import faces_between
 from tests.engine.direct.rising import DOMAIN, DT, at_rest, blob, course, free
 
 H = DOMAIN.voxel_size

@@ -6,7 +6,7 @@ import pytest
 from smokelift.direct.state import SmokeState, complete_velocity, interpolate
 from smokelift.direct.surroundings import Ball
 from smokelift.transport import Velocity, divergence, project
-from smokelift.transport.constraint import faces_of
+from smokelift.transport.pressure import faces_of
 from tests.engine.direct.rising import DOMAIN, DT, along_x, at_rest, blob
 
 

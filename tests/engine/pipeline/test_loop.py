@@ -11,7 +11,7 @@ import pytest
 from threadpoolctl import ThreadpoolController, threadpool_limits
 
 from smokelift import Clip, Sequence, Settings, Velocity, prepare_shot
-from smokelift.baselines.density import FixedRateDescent
+from smokelift.baselines.paper_method import FixedRateDescent
 from smokelift.density import GradientFit, Start, ViewSet
 from smokelift.density.hull import project_voxels
 from smokelift.evaluation.metrics import psnr

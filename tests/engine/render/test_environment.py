@@ -1,12 +1,54 @@
 """Environment pictures as parallel lights: nothing lost, the right way round, the same on every machine."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from smokelift.footage.image_files import ImageError
-from smokelift.render.environment import EnvironmentCells
-from smokelift.scene import EnvironmentLight
-from tests.engine.render.environments import sky, soft_lamps, texels
+from smokelift.output.images import write_image
+from smokelift.render import Optics
+from smokelift.render.environment import EnvironmentCells, environment_count, sampled_lights
+from smokelift.scene import Camera, DirectionalLight, EnvironmentLight, Medium, PointLight, completed
+
+
+@pytest.fixture
+def light_of(tmp_path):
+    """Write a picture and make an environment light of it."""
+
+    def write(radiance: np.ndarray, **options: float) -> EnvironmentLight:
+        write_image(tmp_path / "environment.exr", radiance, half=False)
+        return EnvironmentLight(tmp_path / "environment.exr", **options)
+
+    return write
+
+
+def texels(rows: int, columns: int) -> tuple[np.ndarray, np.ndarray]:
+    """Unit vectors (rows, columns, 3) towards texel centers by the convention's formula, and solid angles (rows, 1)."""
+    u = (np.arange(columns) + 0.5) / columns
+    elevation = np.pi * (0.5 - (np.arange(rows)[:, None] + 0.5) / rows)
+    azimuth = 2 * np.pi * (0.5 - u)
+    level = np.cos(elevation)
+    towards = np.broadcast_arrays(level * np.cos(azimuth), level * np.sin(azimuth), np.sin(elevation))
+    band = np.cos(np.pi * np.arange(rows + 1) / rows)
+    return np.stack(towards, -1), 2 * np.pi / columns * (band[:-1] - band[1:])[:, None]
+
+
+def sky(rows: int = 64, columns: int = 128) -> np.ndarray:
+    """Bright above the horizon, dark below, brighter to one side; blue above, brown below."""
+    towards, _ = texels(rows, columns)
+    z = towards[..., 2:]
+    above = (0.4 + (1 - z) ** 3) * np.array([0.6, 0.8, 1.2])
+    return np.where(z > 0, above, [0.2, 0.15, 0.1]) * (1 + 0.5 * towards[..., :1])
+
+
+def soft_lamps(rows: int = 64, columns: int = 128) -> np.ndarray:
+    """Three wide lamps in random places."""
+    rng = np.random.default_rng(0)
+    towards, _ = texels(rows, columns)
+    places = rng.standard_normal((3, 3))
+    places /= np.linalg.norm(places, axis=1, keepdims=True)
+    return np.exp(2 * towards @ places.T) @ rng.uniform(0.2, 1, (3, 3))
 
 
 def irradiances(lights) -> np.ndarray:
@@ -119,3 +161,30 @@ def test_a_picture_without_light_becomes_none(light_of) -> None:
     assert (
         EnvironmentCells(light_of(black)).lights(16) == EnvironmentCells(light_of(sky(), strength=0.0)).lights(16) == ()
     )
+
+
+def test_an_environment_becomes_parallel_lights_in_its_place_wherever_the_camera_is(light_of, plume) -> None:
+    scene, sun = completed(plume.scene), DirectionalLight((0.57, 0.45, -0.68), (3.0, 2.0, 1.0))
+    lamp = PointLight((4.0, -3.0, 5.0), (60.0, 50.0, 40.0))
+    first, *between, last = sampled_lights(replace(scene, lights=(lamp, light_of(sky(), directions=9), sun)))
+    assert (first, last, len(between)) == (lamp, sun, 9)
+    assert all(isinstance(light, DirectionalLight) for light in between)
+    away = Camera.look_at((0.0, -30.0, 1.0), (0.0, 0.0, 0.7), fov_y_degrees=35, size=(64, 48))
+    scene = replace(scene, lights=(light_of(sky()),))
+    moving = replace(scene, camera=replace(scene.camera, matrices=(scene.camera.matrix, away.matrix)))
+    assert sampled_lights(moving) == sampled_lights(scene)
+
+
+def test_the_count_is_enough_and_few_where_few_are(light_of, plume) -> None:
+    domain, camera, medium = plume.scene.domain, plume.scene.camera, Medium(8.0, 0.9, 0.3)
+    lamp = np.zeros((64, 128, 3))
+    lamp[10, 20] = 1
+    assert environment_count(light_of(lamp), camera, domain, medium) == 4
+    light, black = light_of(sky()), np.zeros(3, np.float32)
+    count = environment_count(light, camera, domain, medium)
+    assert 8 <= count < 256
+    few, many = (
+        Optics(domain, medium, EnvironmentCells(light).lights(number)).renderer(camera, black).image(plume.densities[0])
+        for number in (count, 256)
+    )
+    assert np.linalg.norm(few - many) < 0.01 * np.linalg.norm(many)

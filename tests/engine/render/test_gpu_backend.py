@@ -5,7 +5,7 @@ import pytest
 
 from smokelift.render import Optics, taichi_runtime
 from smokelift.render.cpu_backend import CpuBackend
-from smokelift.render.gpu.backend import GpuBackend
+from smokelift.render.gpu_backend import GpuBackend
 from smokelift.scene import Camera, DirectionalLight, Domain, Medium, PointLight
 
 SHAPE = (9, 10, 12)

@@ -1,7 +1,4 @@
-"""The public functions: exact, by the model that the scene says, with examples that run, strict about input.
-
-And what lights a scene: an environment becomes many simple lights, the same for every camera and frame.
-"""
+"""The public functions: exact, by the model that the scene says, with examples that run, strict about input."""
 
 import doctest
 from dataclasses import replace
@@ -12,10 +9,7 @@ import pytest
 from smokelift import render, render_gradient
 from smokelift.render import Optics, scene_optics, scene_renderer
 from smokelift.render import image as image_module
-from smokelift.render.environment import EnvironmentCells
-from smokelift.render.image import environment_count, sampled_lights
 from smokelift.scene import Camera, DirectionalLight, Domain, Medium, PointLight, Scene, completed
-from tests.engine.render.environments import sky
 
 SHAPE = (14, 12, 16)
 SUN = DirectionalLight((0.57, 0.45, -0.68), (3.0, 2.0, 1.0))
@@ -97,28 +91,3 @@ def test_a_moving_camera_needs_a_frame() -> None:
     moving = replace(ASIDE, matrices=(ASIDE.matrix, ASIDE.matrix))
     with pytest.raises(ValueError):
         scene_renderer(replace(COMPLETE, camera=moving))
-
-
-def test_an_environment_becomes_parallel_lights_in_its_place_wherever_the_camera_is(light_of) -> None:
-    first, *between, last = sampled_lights(replace(COMPLETE, lights=(LAMP, light_of(sky(), directions=9), SUN)))
-    assert (first, last, len(between)) == (LAMP, SUN, 9)
-    assert all(isinstance(light, DirectionalLight) for light in between)
-    away = Camera.look_at((0.0, -30.0, 1.0), (0.0, 0.0, 0.7), fov_y_degrees=35, size=(64, 48))
-    scene = replace(COMPLETE, lights=(light_of(sky()),))
-    moving = replace(scene, camera=replace(scene.camera, matrices=(scene.camera.matrix, away.matrix)))
-    assert sampled_lights(moving) == sampled_lights(scene)
-
-
-def test_the_count_is_enough_and_few_where_few_are(light_of, plume) -> None:
-    domain, camera, medium = plume.scene.domain, plume.scene.camera, Medium(8.0, 0.9, 0.3)
-    lamp = np.zeros((64, 128, 3))
-    lamp[10, 20] = 1
-    assert environment_count(light_of(lamp), camera, domain, medium) == 4
-    light, black = light_of(sky()), np.zeros(3, np.float32)
-    count = environment_count(light, camera, domain, medium)
-    assert 8 <= count < 256
-    few, many = (
-        Optics(domain, medium, EnvironmentCells(light).lights(number)).renderer(camera, black).image(plume.densities[0])
-        for number in (count, 256)
-    )
-    assert np.linalg.norm(few - many) < 0.01 * np.linalg.norm(many)

@@ -7,7 +7,7 @@ import pytest
 from scipy import ndimage
 
 from smokelift import _core
-from smokelift.baselines.velocity import PaperVelocity
+from smokelift.baselines.paper_method import PaperVelocity
 from smokelift.transport import StaggeredGrid, face_shapes
 from smokelift.velocity import DensityPair, PrimalDual
 from tests.engine.transport.random_fields import names, random_faces

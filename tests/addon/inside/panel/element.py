@@ -67,8 +67,7 @@ def test_extract_shows_the_element_of_this_frame(shot, asked, tmp_path) -> None:
     assert [image.name for image in bpy.data.images if "element" in image.name] == [picture.name]
 
 
-def test_render_element_writes_all_frames_that_are_used(shot, asked, tmp_path) -> None:
-    settings = smoke(shot).smokelift
+def test_render_element_writes_all_frames_that_are_used(settings, asked, tmp_path) -> None:
     settings.first, settings.last = 21, 32
     folder = tmp_path / "new" / "element"
     assert bpy.ops.smokelift.render_element(directory=str(folder)) == {"FINISHED"}

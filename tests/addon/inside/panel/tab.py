@@ -20,6 +20,10 @@ LETTERS = 34
 """Of a label without an icon, at most, at the width of the sidebar in a new window."""
 
 
+FIGURES = {"resolution": [48, 48, 64], "seconds": 12, "memory": 2**28, "memory_free": 2**33, "disk": 3e7, "lost": 0.08}
+"""What the engine says of a quality."""
+
+
 class Layout:
     """Keeps the texts that are drawn and the buttons, as ``[identifier]``, in place of Blender's layout."""
 
@@ -41,12 +45,9 @@ class Layout:
 
 def drawn(scene: bpy.types.Scene, *panels: type, brush: object = None) -> list[str]:
     texts: list[str] = []
-    context = SimpleNamespace(
-        scene=scene,
-        window=None,
-        tool_settings=SimpleNamespace(image_paint=SimpleNamespace(brush=brush)),
-        window_manager=bpy.context.window_manager,
-    )
+    tools = SimpleNamespace(image_paint=SimpleNamespace(brush=brush))
+    manager = bpy.context.window_manager
+    context = SimpleNamespace(scene=scene, window=None, tool_settings=tools, window_manager=manager)
     for kind in panels or (bpy.types.SMOKELIFT_PT_view,):
         kind.draw(SimpleNamespace(layout=Layout(texts)), context)
     return texts
@@ -58,31 +59,15 @@ def said(scene: bpy.types.Scene, *panels: type, **drawing: object) -> list[str]:
 
 
 def words(scene: bpy.types.Scene) -> str:
-    """The texts of the tab in one line."""
     return " ".join(said(scene))
 
 
-def know(
-    scene: bpy.types.Scene,
-    doubts: list[tuple[str, str]] | None = None,
-    background_color: list[float] | None = None,
-    **figures: Any,
-) -> None:
+def know(scene: bpy.types.Scene, doubts: Any = (), background_color: Any = None, **figures: Any) -> None:
     """The shot is checked, and all qualities have these figures."""
-    each = {
-        "resolution": [48, 48, 64],
-        "seconds": 12,
-        "memory": 2**28,
-        "memory_free": 2**33,
-        "disk": 3e7,
-        "lost": 0.0772,
-    }
-    each |= figures
-    details = {"qualities": dict.fromkeys(QUALITIES, each)}
-    details["background_color"] = background_color
+    details = {"qualities": dict.fromkeys(QUALITIES, FIGURES | figures), "background_color": background_color}
     details["facts"] = [{"what": "background", "short": "a picture"}]
     shot_check.state.settings, shot_check.state.error = shot_check.settings_text(smoke(scene)), ""
-    shot_check.state.store(smoke(scene), details, doubts or [])
+    shot_check.state.store(smoke(scene), details, list(doubts))
 
 
 def test_no_line_is_cut_off(shot, tmp_path) -> None:
@@ -198,9 +183,8 @@ def test_what_may_be_no_smoke_is_said_before_the_run_with_the_button_that_hides_
     assert "A person moves." not in said(shot)
 
 
-def test_advice_leaves_out_what_is_set_and_is_given_once(shot, tmp_path) -> None:
+def test_advice_leaves_out_what_is_set_and_is_given_once(shot, settings, tmp_path) -> None:
     """Also where a check and two runs doubt the same."""
-    settings = smoke(shot).smokelift
     doubts = [("not all may be smoke", "A person moves.")]
     for outcome in ("done", "waiting"):
         known_run(smoke(shot), Take(tmp_path / outcome), outcome).job.doubts = [("not all is smoke", "A label.")]
@@ -261,9 +245,8 @@ def test_buttons_do_not_move_while_the_clip_is_read_and_smoke_is_made(shot, tmp_
 
 
 @pytest.mark.parametrize("name", ["plate", "mask"])
-def test_pictures_are_chosen_among_pictures(shot, tmp_path, name) -> None:
+def test_pictures_are_chosen_among_pictures(shot, settings, tmp_path, name) -> None:
     """Blender's own button beside a path would list all files."""
-    settings = smoke(shot).smokelift
     assert settings.bl_rna.properties[name].subtype == "NONE"
     kind = bpy.ops.smokelift.choose_picture.get_rna_type().properties
     assert kind["filter_image"].default and kind["filter_movie"].default

@@ -41,7 +41,6 @@ def command(blend: Path, *words: object) -> list[str]:
 
 
 def blender(blend: Path, *words: object) -> subprocess.CompletedProcess[str]:
-    """Run the script on a file."""
     return subprocess.run(command(blend, *words), capture_output=True, text=True, check=False, timeout=300)
 
 
@@ -130,7 +129,6 @@ def running(saved) -> Iterator[subprocess.Popen[str]]:
 
 
 def first_frame(take: Take) -> tuple[Path, int]:
-    """The first volume and when it was written."""
     first = min(take.directory.glob("*.vdb"))
     return first, first.stat().st_mtime_ns
 

@@ -12,7 +12,7 @@ from addon.core import ShotError
 from addon.core.take import Take, takes
 from addon.result import directing, smoke_takes
 from addon.scene import volume
-from addon.scene.box import new_box
+from addon.scene.geometry import new_box
 from addon.scene.smoke import activate, smokes
 from conftest import changed, known_run
 from smokelift.direct.mesh import Mesh
@@ -26,7 +26,6 @@ FRAMES = 6
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
-    """A take of six frames."""
     folder = tmp_path_factory.mktemp("made")
     take = Take(folder / "take_0001")
     take.write({"clip": {"path": "clip.mp4"}}, [])
@@ -49,7 +48,6 @@ def result(shot, made, tmp_path):
 
 @pytest.fixture
 def acting(shot, result) -> bpy.types.Collection:
-    """The collection of what acts on the smoke."""
     collection = bpy.data.collections.new("Effectors")
     shot.collection.children.link(collection)
     result.smokelift.directing.effectors = collection
@@ -81,7 +79,6 @@ def words(options: list[str], name: str) -> list[list[float]]:
 
 
 def solid(content: bytes, tmp_path) -> np.ndarray:
-    """The voxels of an STL file."""
     (tmp_path / "mesh.stl").write_bytes(content)
     return Mesh.read(tmp_path / "mesh.stl").voxels(DOMAIN)
 
@@ -153,7 +150,7 @@ def test_meshes_that_move(shot, result, acting, tmp_path) -> None:
     part = DOMAIN.slices_in(moved.scene.domain)
     assert not moved.density(FRAMES + 5)[part][wanted].any()
     assert len(smokes(bpy.context.scene)) == 1
-    assert "Frames 7 to 11 are a simulation" in volume.provenance_note(result)
+    assert "Frames 7 to 11 are a simulation" in result.data[volume.PROVENANCE]
     build = obj.modifiers.new("Build", "BUILD")
     build.frame_start, build.frame_duration = last, 10
     with pytest.raises(ShotError, match="number of triangles"):
@@ -180,10 +177,8 @@ def test_winds_and_fans(result, acting) -> None:
     for name in ("One", "Two"):
         placed(acting, name, field="WIND", rotation_euler=(0.0, math.pi / 2, 0.0)).field.strength = 0.4
     placed(acting, "Empty", location=(0.1, 0.2, 0.3), empty_display_size=0.25)
-    field = placed(
-        acting, "Force", field="FORCE", location=(0.0, 0.0, 1.0), scale=(2.0, 2.0, 2.0), empty_display_size=0.1
-    )
-    field.field.strength = -2.0
+    large = {"location": (0.0, 0.0, 1.0), "scale": (2.0, 2.0, 2.0), "empty_display_size": 0.1}
+    placed(acting, "Force", field="FORCE", **large).field.strength = -2.0
     gust = placed(acting, "Gust", field="WIND", location=(0.0, 0.5, 1.0)).field
     gust.strength, gust.use_max_distance, gust.distance_max = 3.0, True, 0.3
     result.smokelift.directing.fan_speed = 1.5

@@ -123,13 +123,12 @@ def test_the_size_is_that_of_what_is_on_show(made, monkeypatch) -> None:
     """And of the settings: it is asked for once."""
     asked = []
     monkeypatch.setattr(export, "call_later", lambda *_: asked.append(1))
-    estimate = export.SizeEstimate()
-    assert estimate.size(made) == estimate.size(made) == "" and len(asked) == 1
-    estimate._size = "About 3 MB"
-    assert estimate.size(made) == "About 3 MB"
+    assert export.export_size(made) == export.export_size(made) == "" and len(asked) == 1
+    export._size.update(dict.fromkeys(export._size, "About 3 MB"))
+    assert export.export_size(made) == "About 3 MB"
     directory = volume.shown_take(made).directory
     shutil.copytree(directory, directory.with_name("take_0002"))
     volume.show(made, Take(directory.with_name("take_0002")))
-    assert estimate.size(made) == "" and len(asked) == 2
+    assert export.export_size(made) == "" and len(asked) == 2
     made.smokelift_export.proxy = "2"
-    assert estimate.size(made) == "" and len(asked) == 3
+    assert export.export_size(made) == "" and len(asked) == 3

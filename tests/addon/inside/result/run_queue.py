@@ -106,7 +106,7 @@ def test_a_run_that_is_taken_out_of_the_queue_leaves_nothing(obj, tmp_path) -> N
 
 
 def test_what_cannot_be_started_is_not_queued(obj, tmp_path, monkeypatch) -> None:
-    monkeypatch.setattr(run_queue, "engine_command", Mock(side_effect=ShotError("It is missing.")))
+    monkeypatch.setattr(smoke_takes, "engine_command", Mock(side_effect=ShotError("It is missing.")))
     with pytest.raises(RuntimeError, match="missing"):
         bpy.ops.smokelift.run()
     assert runs == takes(tmp_path / "takes") == []

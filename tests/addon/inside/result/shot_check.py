@@ -9,11 +9,10 @@ import bpy
 import pytest
 
 from addon.core.contract import QUALITIES
-from addon.result import run_queue, shot_check, side_job
-from tests.addon.inside.panel.tab import words
+from addon.result import shot_check, side_job, smoke_takes
+from tests.addon.inside.panel.tab import FIGURES, words
 from tests.example_shot import smoke
 
-FIGURES = {"resolution": [48, 48, 64], "seconds": 12, "memory": 2**28, "memory_free": 2**33, "disk": 3e7, "lost": 0.1}
 FOUND = {"qualities": dict.fromkeys(QUALITIES, FIGURES), "background_color": [0.5, 0.6, 0.7]}
 DONE = {"event": "done", "text": "Done.", **FOUND}
 ENGINE = f"""
@@ -89,7 +88,7 @@ def test_a_run_is_a_reading_too(shot, engine, tmp_path, monkeypatch) -> None:
         {"event": "note", "kind": "empty frames", "text": "No smoke.", "doubt": True, "figures": {}},
     ]
     run = f"for line in {[json.dumps(message) for message in said]!r}: print(line)"
-    monkeypatch.setattr(run_queue, "engine_command", lambda words: [sys.executable, "-c", run])
+    monkeypatch.setattr(smoke_takes, "engine_command", lambda words: [sys.executable, "-c", run])
     state, obj = shot_check.state, smoke(shot)
     obj.smokelift.output = str(tmp_path)
     shot_check.state.settings = ""
@@ -108,7 +107,7 @@ def test_a_run_is_a_reading_too(shot, engine, tmp_path, monkeypatch) -> None:
 
 
 def test_a_run_does_not_read_the_clip_beside_a_check(shot, engine, tmp_path, monkeypatch) -> None:
-    monkeypatch.setattr(run_queue, "engine_command", lambda words: [sys.executable, "-c", ""])
+    monkeypatch.setattr(smoke_takes, "engine_command", lambda words: [sys.executable, "-c", ""])
     smoke(shot).smokelift.output = str(tmp_path)
     shot_check._start(smoke(shot), needs_page=True)
     job = shot_check.check_job.job

@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 import pytest
 
-from addon.scene import compositing, projection, volume
+from addon.scene import compositing, plate, volume
 from conftest import changed, made, pixels, rendered, ticked
 from smokelift.footage.images import srgb_to_linear
 from smokelift.output.images import write_image
@@ -45,7 +45,6 @@ def shown(scene: bpy.types.Scene, tmp_path, **inputs: float) -> np.ndarray:
 
 
 def tree(scene: bpy.types.Scene) -> bpy.types.NodeTree:
-    """The scene's compositor."""
     return scene.compositing_node_group if compositing.SINCE_5 else scene.node_tree
 
 
@@ -146,6 +145,7 @@ def test_each_tick_sets_up_its_part_alone(filmed, part) -> None:
     assert [name for name in before if before[name] != after[name]] == [part]
 
 
+PLANES = (compositing.FLOOR, plate.CARD)
 PLACES = ("WORLD", "COMPOSITE", "PROJECTION")
 
 
@@ -160,11 +160,7 @@ def traces(scene: bpy.types.Scene) -> dict[str, object]:
         "composited": compositing.GROUP in nodes and not nodes[compositing.GROUP].mute,
         "world": "Smokelift" in world and not world["Smokelift"].mute,
         "held out": any(each.holdout for each in scene.view_layers[0].layer_collection.children),
-        "objects": {
-            name
-            for name in (compositing.FLOOR, projection.CARD)
-            if name in scene.objects and not scene.objects[name].hide_render
-        },
+        "objects": {obj.name for obj in scene.objects if obj.name in PLANES and not obj.hide_render},
     }
 
 
@@ -196,7 +192,7 @@ def test_a_place_of_the_plate_undoes_the_one_before(plates, tmp_path, after) -> 
         found[before] = traces(scene)
         scene.render.engine = "CYCLES"
         pictures[before] = rendered(scene, tmp_path / "found.exr")
-    own = {"COMPOSITE": {compositing.FLOOR}, "PROJECTION": {projection.CARD}}
+    own = {"COMPOSITE": {compositing.FLOOR}, "PROJECTION": {plate.CARD}}
     assert found[None]["objects"] == own.get(after, set())
     for before in PLACES:
         assert found[before] == found[None], before

@@ -31,7 +31,6 @@ def lit(scene) -> bpy.types.Scene:
 
 
 def node(scene: bpy.types.Scene) -> bpy.types.ShaderNode:
-    """The one with the values of the scene's smoke."""
     return look.node_of(smoke(scene))
 
 
@@ -53,7 +52,6 @@ def burning(folder: Path, grid: str, medium: Medium, number: int = 1) -> Take:
 
 
 def middle(scene: bpy.types.Scene, preset: str) -> np.ndarray:
-    """Color of the smoke's middle with a preset."""
     assert bpy.ops.smokelift.use_look(preset=preset) == {"FINISHED"}
     return rendered(scene, Path("middle.exr").absolute())[2:6, 2:6].mean((0, 1))
 

@@ -1,189 +1,125 @@
-"""The background that an artist gives: frames of the clip without smoke, and strokes painted on its frames."""
+"""The plate as a projection: from where the clip was filmed it is the clip's, and it stays when the camera moves."""
 
 from pathlib import Path
 
 import bpy
 import numpy as np
 import pytest
-from mathutils import Color
+from mathutils import Matrix, Vector
 
-from addon.core import ShotError
-from addon.panel import element_panel
-from addon.result.smoke_takes import output_folder
-from addon.scene import volume
-from addon.scene.scene_file import footage_tables
-from conftest import changed, made, pixels, pixels_of, save_image
-from smokelift.scene import Background
-from tests.addon.inside.panel.tab import drawn, know
-from tests.example_shot import EXAMPLE, smoke
+from addon.core.take import Take
+from addon.scene import plate, volume
+from conftest import changed, made, rendered
+from smokelift.output.images import write_image
+from smokelift.scene import Camera, Scene, scene_to_dict
+from tests.example_shot import add, add_sun, smoke
 
-# frames of the clip as the clean plate
-
-
-def test_frames_without_smoke_are_the_plate(shot, tmp_path) -> None:
-    settings = smoke(shot).smokelift
-    settings.clip.frame_start, settings.clip.frame_offset = 101, 3
-    for frame in (103, 101, 103):
-        shot.frame_set(frame)
-        assert bpy.ops.smokelift.plate_from_frame() == {"FINISHED"}
-    assert (settings.plate_mode, settings.plate_frames) == ("FRAMES", "3, 1")
-    assert Background(**footage_tables(smoke(shot))["background"]).frame == (3, 5)
-    assert bpy.ops.smokelift.clear_plate_frames() == {"FINISHED"}
-    assert (settings.plate_mode, settings.plate_frames) == ("ESTIMATE", "")
-    assert "background" not in footage_tables(smoke(shot))
+WIDTH, HEIGHT = 48, 32
+BEFORE = Camera.look_at((0.3, -6.0, 2.5), (0.0, 0.0, 1.5), fov_y_degrees=40, size=(WIDTH, HEIGHT))
+TABLE = scene_to_dict(Scene(camera=BEFORE))["camera"]
 
 
-def test_frames_that_the_clip_does_not_have_are_refused(shot) -> None:
-    settings = smoke(shot).smokelift
-    settings.plate_mode = "FRAMES"
-    for text, said in (("", "press Plate from This Frame"), ("0", "has frames 1 to"), ("2, x", "Frames 2, x are not")):
-        settings.plate_frames = text
-        with pytest.raises(ShotError, match=said):
-            footage_tables(smoke(shot))
-    settings.clip.frame_start = 11
-    shot.frame_set(10)
-    for operator in (bpy.ops.smokelift.plate_from_frame, bpy.ops.smokelift.extract):
-        with pytest.raises(RuntimeError, match="not seen in frame 10: go to one from 11 to 58"):
-            operator()
-    settings.clip = bpy.data.movieclips.load(str(EXAMPLE / "clip.mp4"))
-    assert settings.plate_frames == ""
+def picture(shift: int = 0) -> np.ndarray:
+    """Smooth colors that differ everywhere, so that a shift shows (linear light)."""
+    x, y = np.meshgrid(np.linspace(0, 1, WIDTH), np.linspace(0, 1, HEIGHT))
+    colors = np.stack([x, y, 0.5 + 0.3 * np.sin(9 * x + shift)], -1)
+    return (0.1 + 0.6 * colors).astype(np.float32)
 
 
-def test_one_color_is_the_background(shot) -> None:
-    """As the engine asks for it where the clip does not show what is behind its smoke."""
-    settings = smoke(shot).smokelift
-    settings.plate_mode = "COLOR"
-    assert footage_tables(smoke(shot))["background"] == {"color": [0.0, 0.0, 0.0]}
-    settings.plate_color = (0.25, 0.5, 2.0)
-    assert Background(**footage_tables(smoke(shot))["background"]).color == (0.25, 0.5, 2.0)
+def filmed(scene: bpy.types.Scene, folder: Path, table: dict | None = None, plates: int = 1) -> bpy.types.Scene:
+    """A smoke, not rendered, with a take that was filmed by a camera; the scene's camera stands there."""
+    for number in range(1, 7):
+        write_image(folder / f"clip_{number:04d}.png", picture())
+    for number in range(1, plates + 1):
+        write_image(folder / f"plate_{number:04d}.exr", picture(number - 1))
+    background = {"image": str(folder / "plate_0001.exr")}
+    take = made(folder / "out", used=[0, 5], camera=table or TABLE, background=background)
+    settings = smoke(scene).smokelift
+    settings.clip = bpy.data.movieclips.load(str(folder / "clip_0001.png"))
+    settings.light_mode, settings.plate_place = "SCENE", "PROJECTION"
+    volume.show(smoke(scene), take)
+    smoke(scene).hide_render = True
+    scene.cycles.samples, scene.cycles.use_denoising = 16, False
+    assert bpy.ops.smokelift.set_up() == {"FINISHED"}
+    return scene
 
 
-# what the view through the camera shows behind the smoke
+def card(scene: bpy.types.Scene) -> bpy.types.Object:
+    return scene.objects[plate.CARD]
 
 
-def test_the_view_has_the_plate_of_the_render_and_the_clip_at_a_switch(shot, tmp_path) -> None:
-    """Also where a file of before shows the clip; a second set-up changes the plate alone."""
-    obj, camera = smoke(shot), shot.camera.data
-    for name in ("set_up_range", "set_up_light", "set_up_colors"):
-        setattr(obj.smokelift, name, False)
-    obj.smokelift.set_up_plate = False
-    takes = [made(tmp_path, number=number) for number in (1, 2)]
-    for take, background in zip(
-        takes, ({"image": str(EXAMPLE / "plate.png")}, {"color": [0.2, 0.5, 1.0]}), strict=True
-    ):
-        with changed(take) as index:
-            index["scene"] |= {"background": background, "camera": {}}
-    volume.show(obj, takes[0])
+def test_from_the_clips_camera_it_is_the_clips_plate(scene, tmp_path) -> None:
+    found = rendered(filmed(scene, tmp_path), tmp_path / "found.exr")
+    assert found == pytest.approx(picture(), abs=0.02)
+
+
+def test_an_off_center_lens_and_a_tall_pixel(scene, tmp_path) -> None:
+    filmed(scene, tmp_path, TABLE | {"cx": 30.0, "cy": 11.0})
+    scene.camera = scene.objects[plate.PROJECTOR]
+    assert rendered(scene, tmp_path / "found.exr") == pytest.approx(picture(), abs=0.02)
+
+
+def test_it_stays_when_the_camera_moves(scene, tmp_path) -> None:
+    """A point of the card has its color from anywhere; in the world the plate moves with the camera."""
+    filmed(scene, tmp_path)
+    obj = card(scene)
+    scene.camera.location += Vector((1.2, 0.3, 0.4))
+    scene.camera.rotation_euler.rotate(Matrix.Rotation(0.1, 3, "Z"))
+    bpy.context.view_layer.update()
+    moved = rendered(scene, tmp_path / "moved.exr")
+    assert np.abs(moved - picture()).mean() > 0.03
+    # what the moved camera sees at a pixel, by hand: where its ray meets the card, and where the clip shows that
+    camera, checked = scene.camera, 0
+    normal, on_card = obj.matrix_world.to_3x3().col[2], obj.matrix_world.translation
+    for row, column in ((8, 10), (16, 24), (20, 6), (12, 30)):
+        ray = Vector(((column + 0.5 - WIDTH / 2) / BEFORE.fx, (HEIGHT / 2 - row - 0.5) / BEFORE.fx, -1.0))
+        ray = camera.matrix_world.to_3x3() @ ray
+        origin = camera.matrix_world.translation
+        point = origin + ray * ((on_card - origin).dot(normal) / ray.dot(normal))
+        seen = Matrix(TABLE["matrix"]).inverted() @ point
+        u, v = BEFORE.cx - BEFORE.fx * seen.x / seen.z, BEFORE.cy + BEFORE.fy * seen.y / seen.z
+        if 1 <= u < WIDTH - 1 and 1 <= v < HEIGHT - 1:
+            wanted = picture()[int(v), int(u)]
+            assert moved[row, column] == pytest.approx(wanted, abs=0.04)
+            checked += 1
+    assert checked >= 3
+
+
+def test_a_camera_that_moved_projects_each_frame_from_its_place(scene, tmp_path) -> None:
+    poses = []
+    for step in range(6):
+        at = Camera.look_at((0.3 * step, -6.0, 2.5), (0.1 * step, 0.0, 1.5), fov_y_degrees=40, size=(WIDTH, HEIGHT))
+        poses.append([list(row) for row in at.matrix])
+    table = {key: value for key, value in TABLE.items() if key != "matrix"} | {"matrices": poses}
+    scene.camera = add(scene, "Camera", bpy.data.cameras.new("Camera"))
+    smoke(scene).smokelift.set_up_camera = False  # it needs an assumed one
+    filmed(scene, tmp_path, table, plates=6)
+    scene.camera = scene.objects[plate.PROJECTOR]
+    for frame in (1, 4):
+        scene.frame_set(frame)
+        at = scene.camera.matrix_world
+        assert np.allclose(np.array(at), np.array(poses[frame - 1]), atol=1e-5)
+        assert rendered(scene, tmp_path / "found.exr") == pytest.approx(picture(frame - 1), abs=0.02)
+
+
+def test_it_neither_lights_the_smoke_nor_shades_it(scene, tmp_path) -> None:
+    filmed(scene, tmp_path)
+    smoke(scene).hide_render = False
+    card(scene).hide_render = True
+    add_sun(scene, 10.0)
+    scene.frame_set(3)
+    alone = rendered(scene, tmp_path / "alone.exr")
+    other = add(scene, "Roof", card(scene).data)
+    other.location.z, other.visible_camera = 3.6, False
+    assert rendered(scene, tmp_path / "roofed.exr") == pytest.approx(alone, abs=0.02)
+    assert alone.max() > 0.1
+
+
+def test_one_color(scene, tmp_path) -> None:
+    filmed(scene, tmp_path)
+    take = volume.shown_take(smoke(scene))
+    assert isinstance(take, Take)
+    with changed(take) as index:
+        index["scene"]["background"] = {"color": [0.5, 0.1, 0.0]}
     bpy.ops.smokelift.set_up()
-    (clip,) = camera.background_images
-    assert (clip.clip, clip.show_background_image) == (obj.smokelift.clip, True)
-    obj.smokelift.set_up_plate = True
-    bpy.ops.smokelift.set_up()
-    plate, clip = camera.background_images
-    assert (Path(plate.image.filepath).name, plate.show_background_image) == ("plate.png", True)
-    assert (clip.clip, clip.show_background_image) == (obj.smokelift.clip, False)
-    assert "Clip in View" in drawn(shot, bpy.types.SMOKELIFT_PT_view_set_up)
-    plate.show_background_image, clip.show_background_image = False, True
-    volume.show(obj, takes[1])
-    bpy.ops.smokelift.set_up()
-    plate, clip = camera.background_images
-    shown = Color(plate.image.generated_color[:3]).from_srgb_to_scene_linear()
-    assert tuple(shown) == pytest.approx((0.2, 0.5, 1.0), abs=1e-3)
-    assert (plate.show_background_image, clip.show_background_image) == (False, True)
-
-
-def test_the_color_begins_with_the_one_that_was_found(shot) -> None:
-    """Unless there is none, or one was chosen; another clip has another."""
-    settings = smoke(shot).smokelift
-    for found, chosen, wanted in ((None, None, 0.0), (0.5, None, 0.5), (0.7, None, 0.5), (0.7, 0.9, 0.9)):
-        know(shot, background_color=None if found is None else [found] * 3)
-        settings.plate_mode = "ESTIMATE"
-        if chosen is not None:
-            settings.plate_color = [chosen] * 3
-        settings.plate_mode = "COLOR"
-        assert tuple(settings.plate_color) == pytest.approx([wanted] * 3)
-    settings.plate_mode, settings.clip = "ESTIMATE", bpy.data.movieclips.load(str(EXAMPLE / "clip.mp4"))
-    settings.plate_mode = "COLOR"
-    assert tuple(settings.plate_color) == pytest.approx([0.7] * 3)
-    assert "[ui.eyedropper_color]" in drawn(shot, bpy.types.SMOKELIFT_PT_view)
-
-
-# strokes
-
-
-def paint(image: bpy.types.Image, color: tuple[float, float, float], opacity: float, rows: slice) -> None:
-    """Paint some rows of an image, as a brush does."""
-    values = pixels_of(image).copy()
-    values[rows, :, :3] += opacity * (color - values[rows, :, :3])
-    image.pixels.foreach_set(values[::-1].ravel())
-
-
-def test_strokes_are_painted_on_the_clips_frame(shot, tmp_path) -> None:
-    """Below them is the clip; the file has the strokes alone, and follows before a run."""
-    settings = smoke(shot).smokelift
-    settings.output = str(tmp_path / "out")
-    shot.frame_set(20)
-    assert bpy.ops.smokelift.paint_strokes() == {"FINISHED"}
-    image, file = settings.strokes, output_folder(smoke(shot)) / "strokes.png"
-    assert Path(bpy.path.abspath(image.filepath)) == file
-    first = pixels_of(image).copy()
-    assert first[..., 3].min() == 1.0 and first[..., :3].max() > 0.5
-    assert footage_tables(smoke(shot))["background"] == {"image": str(EXAMPLE / "plate.png"), "strokes": str(file)}
-    assert not pixels(file).any()
-    green, red, black = (0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-    for color, opacity, rows in ((green, 0.8, slice(9)), (red, 1.0, slice(9, 12)), (black, 1.0, slice(4))):
-        paint(image, color, opacity, rows)
-    footage_tables(smoke(shot))
-    found = pixels(file)
-    assert (found[4:9] == (*green, 1.0)).all() and (found[9:12] == (*red, 1.0)).all()
-    assert not found[:4].any() and not found[12:].any()
-    assert not image.is_dirty
-    # another frame below: the strokes stay, and the frame is seen where they were erased
-    shot.frame_set(40)
-    assert bpy.ops.smokelift.paint_strokes() == {"FINISHED"}
-    second = pixels_of(image)
-    assert (second[4:9] == (*green, 1.0)).all() and second[..., 3].min() == 1.0
-    assert np.abs(second[12:] - first[12:]).max() > 0.05
-    image.save()  # by the artist, with the frame below
-    footage_tables(smoke(shot))
-    assert (pixels(file) == found).all()
-    assert len(bpy.data.scenes) == 1
-    assert [each for each in bpy.data.images if each.source != "VIEWER"] == [image]
-    # they are opened again where they were made
-    bpy.data.images.remove(image)
-    assert settings.strokes is None
-    assert bpy.ops.smokelift.paint_strokes() == {"FINISHED"}
-    assert (pixels_of(settings.strokes)[4:9] == (*green, 1.0)).all()
-
-
-def test_other_images_are_strokes_too(shot, tmp_path) -> None:
-    image = smoke(shot).smokelift.strokes = save_image(tmp_path / "mine.png", smoke(shot).smokelift.clip.size)
-    paint(image, (0.3, 0.6, 0.3), 1.0, slice(4))
-    assert Background(**footage_tables(smoke(shot))["background"]).strokes == tmp_path / "mine.png"
-    assert pixels(tmp_path / "mine.png")[:4, :, 1] == pytest.approx(0.6, abs=0.01)
-
-
-def test_strokes_that_cannot_be_written_are_named(shot, tmp_path) -> None:
-    smoke(shot).smokelift.output = str(tmp_path / "out")
-    bpy.ops.smokelift.paint_strokes()
-    (tmp_path / "file").touch()
-    smoke(shot).smokelift.strokes.filepath_raw = str(tmp_path / "file" / "strokes.png")
-    with pytest.raises(ShotError, match=r"strokes\.png cannot be written"):
-        footage_tables(smoke(shot))
-
-
-@pytest.mark.parametrize(("size", "saved", "said"), [((8, 8), True, "8 x 8 pixels"), ((256, 384), False, "in no file")])
-def test_an_image_that_does_not_fit_is_refused(shot, tmp_path, size, saved, said) -> None:
-    file = tmp_path / "mine.png"
-    image = save_image(file, size) if saved else bpy.data.images.new("mine", *size, alpha=True)
-    smoke(shot).smokelift.strokes = image
-    with pytest.raises(ShotError, match=said):
-        footage_tables(smoke(shot))
-
-
-@pytest.mark.parametrize("means", element_panel.COLORS)
-def test_a_stroke_has_the_color_that_says_it(shot, means) -> None:
-    assert bpy.ops.smokelift.stroke(means=means) == {"FINISHED"}
-    paint = shot.tool_settings.image_paint
-    holder = getattr(paint, "unified_paint_settings", None) or shot.tool_settings.unified_paint_settings
-    assert tuple(holder.color) == element_panel.COLORS[means]
+    assert rendered(scene, tmp_path / "found.exr")[5, 5] == pytest.approx([0.5, 0.1, 0.0], abs=0.01)

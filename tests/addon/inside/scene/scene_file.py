@@ -12,7 +12,7 @@ from mathutils import Euler, Matrix, Vector
 from addon.core import ShotError
 from addon.core.contract import BOX_VOXELS
 from addon.core.take import Take
-from addon.scene.box import box_corners, engine_to_world
+from addon.scene.geometry import box_corners, engine_to_world
 from addon.scene.scene_file import options, shot_tables
 from conftest import save_image
 from smokelift.scene import Scene
@@ -28,7 +28,6 @@ def engines(scene: bpy.types.Scene, folder: Path) -> Scene:
 
 
 def refusal(scene: bpy.types.Scene) -> str:
-    """The sentence with which a shot is refused."""
     with pytest.raises(ShotError) as caught:
         shot_tables(smoke(scene))
     return str(caught.value)
@@ -146,35 +145,32 @@ def test_one_picture_is_no_clean_plate_of_a_moving_camera(tracked, tmp_path) -> 
 @pytest.mark.parametrize(
     ("spoil", "words"),
     [
-        (lambda s: setattr(s, "camera", None), "no camera"),
-        (lambda s: setattr(s.camera.data, "type", "PANO"), "panoramic"),
-        (lambda s: setattr(s.render, "resolution_x", 1920), "Match Scene to Clip"),
-        (lambda s: setattr(smoke(s).smokelift, "clip", None), "Choose a clip"),
-        (lambda s: setattr(smoke(s).smokelift, "last", 49), "frames 1 to 48"),
-        (
-            lambda s: setattr(smoke(s).smokelift, "first", 30) or setattr(smoke(s).smokelift, "last", 20),
-            "Frames 30 to 20",
-        ),
-        (lambda s: setattr(smoke(s).smokelift, "plate", ""), "Choose the clean plate"),
-        (lambda s: setattr(smoke(s).smokelift, "plate", "//none.png"), "none.png is not there"),
-        (lambda s: setattr(smoke(s).smokelift, "mask", "//mask.png"), "mask.png is not there"),
-        (lambda s: setattr(smoke(s).smokelift, "box", None), "Make Box"),
-        (lambda s: setattr(smoke(s).smokelift.box, "scale", (1.0, 0.0, 1.0)), "flat"),
-        (lambda s: setattr(smoke(s).smokelift.box, "location", (30.0, 0.0, 1.5)), "not in the camera's picture"),
-        (lambda s: setattr(smoke(s).smokelift.box, "location", (0.0, -30.0, 1.5)), "not in the camera's picture"),
-        (lambda s: setattr(s.camera, "scale", (1.0, 1.0, -1.0)), "mirrored"),
-        (lambda s: setattr(smoke(s).smokelift.clip, "filepath", "//moved.mp4"), "moved.mp4 is not there"),
-        (lambda s: bpy.data.objects.remove(bpy.data.objects["Sun"]), "no sun"),
-        (lambda s: setattr(add_lamp(s, "POINT"), "location", (0.0, 0.0, 1.0)), "inside the box"),
-        (lambda s: setattr(add_lamp(s, "AREA"), "name", "Window"), "Window cannot be used"),
-        (lambda s: zoom(s.camera.data), "camera zooms"),
-        (lambda s: setattr(add_inlet(s), "location", (0.0, 0.0, -2.0)), "inlet is outside the box"),
-        (lambda s: setattr(add_inlet(s), "scale", (0.0, 0.0, 0.0)), "inlet has no size"),
+        (lambda s, own: setattr(s, "camera", None), "no camera"),
+        (lambda s, own: setattr(s.camera.data, "type", "PANO"), "panoramic"),
+        (lambda s, own: setattr(s.render, "resolution_x", 1920), "Match Scene to Clip"),
+        (lambda s, own: setattr(own, "clip", None), "Choose a clip"),
+        (lambda s, own: setattr(own, "last", 49), "frames 1 to 48"),
+        (lambda s, own: setattr(own, "first", 30) or setattr(own, "last", 20), "Frames 30 to 20"),
+        (lambda s, own: setattr(own, "plate", ""), "Choose the clean plate"),
+        (lambda s, own: setattr(own, "plate", "//none.png"), "none.png is not there"),
+        (lambda s, own: setattr(own, "mask", "//mask.png"), "mask.png is not there"),
+        (lambda s, own: setattr(own, "box", None), "Make Box"),
+        (lambda s, own: setattr(own.box, "scale", (1.0, 0.0, 1.0)), "flat"),
+        (lambda s, own: setattr(own.box, "location", (30.0, 0.0, 1.5)), "not in the camera's picture"),
+        (lambda s, own: setattr(own.box, "location", (0.0, -30.0, 1.5)), "not in the camera's picture"),
+        (lambda s, own: setattr(s.camera, "scale", (1.0, 1.0, -1.0)), "mirrored"),
+        (lambda s, own: setattr(own.clip, "filepath", "//moved.mp4"), "moved.mp4 is not there"),
+        (lambda s, own: bpy.data.objects.remove(bpy.data.objects["Sun"]), "no sun"),
+        (lambda s, own: setattr(add_lamp(s, "POINT"), "location", (0.0, 0.0, 1.0)), "inside the box"),
+        (lambda s, own: setattr(add_lamp(s, "AREA"), "name", "Window"), "Window cannot be used"),
+        (lambda s, own: zoom(s.camera.data), "camera zooms"),
+        (lambda s, own: setattr(add_inlet(s), "location", (0.0, 0.0, -2.0)), "inlet is outside the box"),
+        (lambda s, own: setattr(add_inlet(s), "scale", (0.0, 0.0, 0.0)), "inlet has no size"),
     ],
 )
-def test_what_is_missing_is_said(shot, spoil, words) -> None:
+def test_what_is_missing_is_said(shot, settings, spoil, words) -> None:
     shot_tables(smoke(shot))
-    spoil(shot)
+    spoil(shot, settings)
     bpy.context.view_layer.update()
     assert words in refusal(shot)
 
@@ -300,9 +296,8 @@ def test_an_inlet(shot, tmp_path) -> None:
     assert engines(shot, tmp_path).inlets == ()
 
 
-def test_a_distance(shot) -> None:
+def test_a_distance(shot, settings) -> None:
     """Said to the engine if it is given, unless an inlet says it; by hand it begins at the middle of the box."""
-    settings = smoke(shot).smokelift
     assert not any(word.startswith("--distance") for word in options(smoke(shot)))
     bpy.context.view_layer.update()
     settings.use_distance = True
@@ -383,9 +378,8 @@ def test_world_pictures_that_cannot_be_used(shot, panorama) -> None:
 # medium
 
 
-def test_a_medium_of_ones_own(shot, tmp_path) -> None:
+def test_a_medium_of_ones_own(shot, settings, tmp_path) -> None:
     assert engines(shot, tmp_path).medium is None
-    settings = smoke(shot).smokelift
     settings.use_medium, settings.extinction, settings.albedo, settings.anisotropy = True, 7.0, 0.5, -0.25
     medium = engines(shot, tmp_path).medium
     assert (medium.extinction, medium.albedo, medium.anisotropy) == (7.0, 0.5, -0.25)

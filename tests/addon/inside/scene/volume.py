@@ -11,7 +11,7 @@ from mathutils import Vector
 from addon.core.take import Take
 from addon.result import smoke_takes
 from addon.scene import look, shot_setup, volume
-from addon.scene.box import box_corners
+from addon.scene.geometry import box_corners
 from conftest import FRAMES, changed, made, played, quietly, rendered
 from smokelift.output.images import write_image, write_video
 from smokelift.scene import Camera, Medium, Scene, scene_to_dict
@@ -21,7 +21,6 @@ HALF_VOXEL_TOO_FAR = bpy.app.version < (5, 0, 0)
 
 
 def plays(scene: bpy.types.Scene, frame: int) -> int | None:
-    """Number of the file that is seen in a frame."""
     name = played(smoke(scene), frame)
     return int(name[6:10]) if name else None
 
@@ -181,12 +180,12 @@ def test_the_material_is_the_mediums(shot, tmp_path) -> None:
 
 
 def part(what: str, how: str = "", origin: str = "made up", **settings: float) -> dict[str, object]:
-    """A part of a provenance."""
     return {"what": what, "origin": origin, "how": how, "settings": settings}
 
 
 CONTINUED = "Frames {} to {} are a simulation that starts from frame {}, with 3 of the clip."
 LOOP = "In frames {} to {} the end of the loop becomes its start."
+CHAIN = [part("continue", CONTINUED), part("retime"), part("loop", LOOP.format(1, 3))]
 MADE = "degrees beside it. Made up: Depth Detail 0.5, Variation 3."
 
 
@@ -197,25 +196,21 @@ MADE = "degrees beside it. Made up: Depth Detail 0.5, Variation 3."
         ([part("velocity", origin="estimated")], "degrees beside it. Nothing is made up"),
         ([], ""),
         ([part("continue", CONTINUED.format(7, 11, 6))], CONTINUED.format(46, 50, 45)),
-        (
-            [part("continue", CONTINUED), part("retime"), part("loop", LOOP.format(1, 3))],
-            f"{LOOP.format(40, 42)} Before",
-        ),
+        (CHAIN, f"{LOOP.format(40, 42)} Before"),
     ],
 )
 def test_what_is_made_up_is_said(shot, tmp_path, parts, said) -> None:
     """With the clip's frames; those of earlier results are not said of what was made of them."""
-    assert volume.provenance_note(smoke(shot)) == ""
+    assert smoke(shot).data.get(volume.PROVENANCE, "") == ""
     take = made(tmp_path, used=[39, 44])
     with changed(take) as index:
         index["provenance"] = parts
     volume.show(smoke(shot), take)
-    note = volume.provenance_note(smoke(shot))
+    note = smoke(shot).data[volume.PROVENANCE]
     assert said in note and bool(note) == bool(parts)
     assert ("simulation" in note) == (said.startswith("Frames"))
-    assert smoke(shot).data[volume.PROVENANCE] == note
     volume.show(smoke(shot), made(tmp_path, number=2))
-    assert volume.provenance_note(smoke(shot)) == ""
+    assert smoke(shot).data.get(volume.PROVENANCE, "") == ""
 
 
 def test_a_new_result_replaces_the_old_one_and_what_was_changed_of_its_material_stays(shot, tmp_path) -> None:
@@ -234,12 +229,11 @@ def test_a_new_result_replaces_the_old_one_and_what_was_changed_of_its_material_
     assert obj.data.display.density == 1.5
 
 
-def test_it_survives_saving_and_loading(shot, tmp_path) -> None:
+def test_it_survives_saving_and_loading(shot, settings, tmp_path) -> None:
     """Settings, smoke, material; the files are found relative to the .blend, also after the folder moved."""
     home = tmp_path / "home"
     home.mkdir()
     bpy.ops.wm.save_as_mainfile(filepath=str(home / "shot.blend"))
-    settings = smoke(shot).smokelift
     settings.first, settings.last, settings.quality, settings.output = 3, 8, "fine", "//out"
     shot.render.fps, settings.speed = 48, "REAL"
     volume.show(smoke(shot), made(home / "out"))

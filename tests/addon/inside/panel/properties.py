@@ -6,7 +6,7 @@ from pathlib import Path
 import bpy
 import pytest
 
-from addon.panel import preferences
+from addon.panel import properties
 from addon.result import smoke_takes
 from addon.scene.blender import PACKAGE, thread_options
 from addon.scene.smoke import new_smoke, smokes
@@ -15,7 +15,6 @@ from tests.example_shot import EXAMPLE
 
 @pytest.fixture
 def user(blender) -> Iterator[bpy.types.AddonPreferences]:
-    """The preferences of a user who has the add-on installed."""
     entry = bpy.context.preferences.addons.new()
     entry.module = PACKAGE
     yield entry.preferences
@@ -49,7 +48,7 @@ def test_settings_are_kept_as_a_preset(scene, clip, monkeypatch, tmp_path) -> No
     first = new_smoke(scene, clip)
     first.smokelift.detail, first.smokelift.closed, first.smokelift.first = 0.25, {"x-", "z-"}, 7
     assert bpy.ops.smokelift.add_preset(name="My Smoke") == {"FINISHED"}
-    (file,) = (tmp_path / "presets" / preferences.FOLDER).iterdir()
+    (file,) = (tmp_path / "presets" / properties.FOLDER).iterdir()
     second = new_smoke(scene, clip)
     bpy.ops.script.execute_preset(filepath=str(file), menu_idname="SMOKELIFT_PT_presets")
     assert second.smokelift.detail == 0.25 and second.smokelift.closed == {"x-", "z-"}

@@ -1,4 +1,7 @@
-"""The renderer on a GPU: Taichi kernels (``light_kernels``, ``camera_kernels``) over the box around the smoke."""
+"""The renderer on a GPU: Taichi runs ``gpu_kernels`` over the box around the smoke.
+
+It is imported only after a GPU is found: importing Taichi takes longer than a picture.
+"""
 
 from typing import Any
 
@@ -7,12 +10,10 @@ from scipy import ndimage
 
 import smokelift._core as _core
 from smokelift.checks import Array
+from smokelift.render import gpu_kernels as kernels
 from smokelift.render import taichi_runtime as taichi
-from smokelift.render.diffuse_light import DiffuseLight
-from smokelift.render.gpu import camera_kernels as camera
-from smokelift.render.gpu import light_kernels as light
-from smokelift.render.light_sweeps import Face, ParallelSweep, PointSweep, Sweep
-from smokelift.render.plan import RenderPlan
+from smokelift.render.cpu_backend import DiffuseLight
+from smokelift.render.plan import Face, ParallelSweep, PointSweep, RenderPlan, Sweep
 
 
 class GpuBackend:
@@ -44,7 +45,7 @@ class GpuBackend:
     def image(self, density: Array, keep_record: bool) -> tuple[Array, Array]:
         """Scattered radiance (rows, columns, channels) and optical depth (rows, columns)."""
         plan = self._plan
-        camera.pack(taichi.upload(density[plan.box]), self._marked, self._medium, plan.medium.extinction)
+        kernels.pack(taichi.upload(density[plan.box]), self._marked, self._medium, plan.medium.extinction)
         if plan.shadows:
             self._shade()
         if self._diffuse:  # blocks are few, so the processor follows the light among them
@@ -55,7 +56,7 @@ class GpuBackend:
             self._record = taichi.zeros((max(plan.shape), *plan.rays.length.shape, self._channels + 1))
         record = self._record if keep_record else self._medium
         for axis in plan.rays.axes:
-            camera.march(
+            kernels.march(
                 self._medium, self._lines, self._length, self._planes,
                 self._scattered, self._depth, record, axis, self._channels, keep_record,
             )  # fmt: skip
@@ -68,13 +69,13 @@ class GpuBackend:
             self._gradient = taichi.zeros((*self._padded, self._channels + 1))
         if not self._channels:
             scattered_gradient = np.zeros((*transmittance_gradient.shape, 1), np.float32)
-        camera.march_adjoint(
+        kernels.march_adjoint(
             self._record, self._length, self._planes, self._depth,
             taichi.upload(scattered_gradient), taichi.upload(transmittance_gradient), self._channels,
         )  # fmt: skip
         to_pixel = taichi.matrix(plan.rays.to_pixel)
         for number, axis in enumerate(plan.rays.axes or (0,)):
-            camera.gather_gradient(
+            kernels.gather_gradient(
                 self._record, self._lines, self._planes, to_pixel, self._near, self._gradient,
                 axis, self._channels, number,
             )  # fmt: skip
@@ -85,7 +86,7 @@ class GpuBackend:
         if plan.shadows:
             self._shade_adjoint()
         in_box = taichi.zeros(plan.shape)
-        camera.unpack(self._gradient, self._marked, in_box, plan.medium.extinction)
+        kernels.unpack(self._gradient, self._marked, in_box, plan.medium.extinction)
         result = np.zeros(plan.domain.resolution, np.float32) if out is None else out
         result[plan.box] = taichi.download(in_box)
         return result
@@ -93,7 +94,7 @@ class GpuBackend:
     def _shade(self) -> None:
         for number, sweep in enumerate(self._plan.lights):
             self._sweeps.scatter(sweep, self._medium, self._medium, number)
-        camera.extend_into_border(self._medium)
+        kernels.extend_into_border(self._medium)
 
     def _shade_adjoint(self) -> None:
         if self._scratch is None:
@@ -103,7 +104,7 @@ class GpuBackend:
                 self._sweeps.scatter_parallel(sweep, self._medium, self._gradient, self._scratch, adjoint=True)
                 # the adjoint of the sweep is that of the light that travels the other way
                 columns = self._sweeps.columns(sweep, self._scratch, -sweep.travel)
-                light.add_parallel_shadow(
+                kernels.add_parallel_shadow(
                     columns, self._near, self._gradient, sweep.axis, self._sweeps.slopes[sweep], sweep.step
                 )
                 continue
@@ -112,8 +113,8 @@ class GpuBackend:
                     sweep, face, self._medium, self._gradient, self._scratch, adjoint=True
                 )
                 rays = self._sweeps.rays[sweep, face]
-                light.accumulate_rays(self._scratch, columns, face.axis, rays, sweep.voxel_size, True)
-                light.add_point_shadow(columns, self._near, self._gradient, face.axis, rays)
+                kernels.accumulate_rays(self._scratch, columns, face.axis, rays, sweep.voxel_size, True)
+                kernels.add_point_shadow(columns, self._near, self._gradient, face.axis, rays)
 
 
 class LightSweeps:
@@ -128,14 +129,14 @@ class LightSweeps:
         phase = taichi.matrix(plan.to_eye), plan.medium.anisotropy, plan.medium.albedo
         self._shadings, self.slopes, self.rays = dict[Sweep, Any](), dict[Sweep, Any](), dict[tuple[Sweep, Face], Any]()
         for sweep in plan.lights:
-            self._shadings[sweep] = light.Shading(taichi.vector(np.resize(sweep.energy, 3)), *phase)
+            self._shadings[sweep] = kernels.Shading(taichi.vector(np.resize(sweep.energy, 3)), *phase)
             if isinstance(sweep, ParallelSweep):
-                self.slopes[sweep] = light.Slopes(*sweep.slope, sweep.first)
+                self.slopes[sweep] = kernels.Slopes(*sweep.slope, sweep.first)
                 continue
             for face in sweep.faces:
                 begin = taichi.vector(np.array([face.columns_b[0], face.columns_c[0]]))
                 position = taichi.vector(sweep.position)
-                self.rays[sweep, face] = light.Rays(face.travel, face.first, face.far, begin, position)
+                self.rays[sweep, face] = kernels.Rays(face.travel, face.first, face.far, begin, position)
 
     def scatter(self, sweep: Sweep, medium: Any, result: Any, add: int) -> None:
         """Write, or ``add``, the radiance of a light that a medium scatters, in the channels after its first one."""
@@ -148,8 +149,8 @@ class LightSweeps:
     def scatter_parallel(
         self, sweep: ParallelSweep, medium: Any, source: Any, result: Any, add: int = 0, *, adjoint: bool = False
     ) -> None:
-        """Do `light_kernels.scatter_parallel` with the columns of a parallel light."""
-        light.scatter_parallel(
+        """Do `kernels.scatter_parallel` with the columns of a parallel light."""
+        kernels.scatter_parallel(
             self.columns(sweep, medium, sweep.travel), self._near, source, result, sweep.axis, self.slopes[sweep],
             sweep.step, taichi.vector(sweep.direction), self._shadings[sweep], add, adjoint,
         )  # fmt: skip
@@ -158,17 +159,17 @@ class LightSweeps:
         self, sweep: PointSweep, face: Face, medium: Any, source: Any, result: Any, add: int = 0, *,
         adjoint: bool = False,
     ) -> Any:  # fmt: skip
-        """Do `light_kernels.scatter_point` through one face of a point light, and return its columns."""
+        """Do `kernels.scatter_point` through one face of a point light, and return its columns."""
         columns, rays = self._of_shape(face.planes, face.columns_b[1], face.columns_c[1]), self.rays[sweep, face]
-        light.accumulate_rays(medium, columns, face.axis, rays, sweep.voxel_size, False)
+        kernels.accumulate_rays(medium, columns, face.axis, rays, sweep.voxel_size, False)
         shading = self._shadings[sweep]
-        light.scatter_point(columns, self._near, source, result, face.axis, rays, shading, add, adjoint)
+        kernels.scatter_point(columns, self._near, source, result, face.axis, rays, shading, add, adjoint)
         return columns
 
     def columns(self, sweep: ParallelSweep, voxels: Any, travel: int) -> Any:
         """Sums over voxels along the columns of a parallel light, one way or the other along its axis."""
         columns = self._of_shape(*(n + (axis != sweep.axis) for axis, n in enumerate(self._shape)))
-        light.accumulate_columns(voxels, columns, sweep.axis, travel, self.slopes[sweep])
+        kernels.accumulate_columns(voxels, columns, sweep.axis, travel, self.slopes[sweep])
         return columns
 
     def _of_shape(self, *shape: int) -> Any:

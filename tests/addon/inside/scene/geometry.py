@@ -6,7 +6,7 @@ import pytest
 from mathutils import Vector
 
 from addon.core import ShotError
-from addon.scene.floor import Floor
+from addon.scene.geometry import Floor
 from addon.scene.scene_file import shot_tables
 from smokelift.density.upright_plane import depth_at
 from smokelift.scene import Scene, scene_from_dict
@@ -29,7 +29,6 @@ def clicked(scene: bpy.types.Scene, *points: tuple[float, float, float]) -> floa
 
 
 def engines(scene: bpy.types.Scene) -> Scene:
-    """The scene as the engine reads it."""
     bpy.context.view_layer.update()
     return scene_from_dict(shot_tables(smoke(scene)))
 
