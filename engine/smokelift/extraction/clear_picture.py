@@ -41,7 +41,7 @@ from smokelift.footage.images import (
     push_pull,
     srgb_to_linear,
 )
-from smokelift.footage.noise import EIGHT_BIT_STEP, Noise, at_rank, count_of_seen, median_of_seen, peak_spread
+from smokelift.footage.noise import EIGHT_BIT_STEP, Noise, at_rank, count_of_seen, spread_over_time
 
 WINDOW = 6.0
 """Width of the window of a pixel's clear values, in standard deviations of noise: three to either side."""
@@ -135,7 +135,7 @@ def clear_picture(proxy: Proxy, noise: Noise, painted: Mask | None = None) -> Cl
     values = np.stack([blurred(encoded @ weights, width) for encoded in proxy.encoded])
     values[~seen] = np.nan
     some = np.ascontiguousarray(values[:, ::STRIDE, ::STRIDE])
-    window = max(WINDOW * peak_spread(some - median_of_seen(some)), float(MIN_WINDOW))
+    window = max(WINDOW * spread_over_time(some), float(MIN_WINDOW))
     similarity, brightness, brightens = _smoke_of(some, window)
     height, across = values.shape[1:]
     brightens = np.repeat(np.repeat(brightens, STRIDE, 0), STRIDE, 1)[:height, :across]

@@ -40,6 +40,13 @@ degrees of freedom, and the median of chi-squared is (1 - 2 / (9 k))^3 of its me
 LARGEST_LASTING = np.float32(4 / 255)
 """Largest lasting noise, in sRGB values: a codec's changes are up to twice as large (`clear_picture.DRIFT`)."""
 
+MIN_SLOW = 0.95 * float(LARGEST_LASTING)
+"""Spread about the median over time, in sRGB values, from which on it is wider than that of noise: slow smoke."""
+
+MAX_QUICK = 0.5
+"""Largest part of that spread which is noise beside slow smoke: four public clips full of it have .12 to .44, two with
+people and an exposure that changes .59 and .82 (docs/experiments/background.md)."""
+
 SPREAD_SAMPLES, SPREAD_ROUNDS = 50_000, 25
 """Largest number of deviations that a spread is measured on, and rounds in which it settles to a hundredth."""
 
@@ -169,6 +176,20 @@ def peak_spread(deviations: Picture, largest: np.float32 = LARGEST_LASTING) -> f
         variance = float((weight * squares).sum() / max(float(weight.sum()), 1e-6))
         variance = min(max(variance, float(MIN_SPREAD**2)), float(largest**2))
     return float(np.sqrt(variance))
+
+
+def spread_over_time(values: Picture) -> float:
+    """Return the standard deviation of the noise of values (frames, ...): how far they spread about their medians.
+
+    Slow smoke all over a picture spreads further than noise, and without a peak. Less the means of the frames before
+    and after there is hardly anything left of it, and if little is left in all, that is the noise.
+    """
+    spread = peak_spread(values - median_of_seen(values))
+    if spread < MIN_SLOW or len(values) < 3:
+        return spread
+    # what differs from a mean of two others spreads as far as three halves of the variance of each
+    quick = peak_spread(values[1:-1] - 0.5 * (values[:-2] + values[2:])) / 1.5**0.5
+    return quick if quick < MAX_QUICK * spread else spread
 
 
 def noise_about(deviations: Picture, blocks: Picture) -> Noise:

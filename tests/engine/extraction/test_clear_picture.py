@@ -118,6 +118,18 @@ def test_a_wall_that_is_hardly_shaded_tells_its_smoke_by_hue(tmp_path) -> None:
     assert estimate.source == pytest.approx(np.full(3, 0.4), rel=0.25)
 
 
+def test_slow_fog_that_never_leaves_is_no_noise_of_its_background(tmp_path) -> None:
+    """It changes by a code or two from frame to frame, and by forty in all."""
+    rows, columns = np.mgrid[:HEIGHT, :WIDTH]
+    waves = rows / 14 + columns / 25
+
+    def opacity(n: int) -> np.ndarray:
+        return 0.45 + 0.2 * np.sin(2 * np.pi * n / 40 + waves)
+
+    plate = plate_of(film(tmp_path, wall(0.2, 0.5), opacity, 0.02, 0.5))
+    assert plate.confidence.mean() < 0.3
+
+
 def test_the_last_smoke_is_no_part_of_a_smooth_wall(tmp_path) -> None:
     """Half of the frames show its haze alone, as steady as the wall."""
     tone = np.linspace(0.15, 0.4, HEIGHT, dtype=np.float32)[:, None, None]
