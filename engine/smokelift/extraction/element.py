@@ -182,18 +182,18 @@ def compared_size(cells: tuple[int, int], whole: tuple[int, int], finest: float,
     return columns, rows
 
 
-def first_source(seen: Sequence[Cells]) -> Picture:
-    """Return the J (3,) that the search starts from: that of what brightens the plates most.
+def first_source(seen: Sequence[Cells], side: int = 1) -> Picture:
+    """Return the J (3,) that the search starts from: that of what brightens the plates most, or darkens (-1) them.
 
-    It is gray unless its hue is far from that: half of it may be what is behind the smoke. If nothing brightens the
-    plates beyond the noise of a pixel, it is gray and as bright as the brightest pixels.
+    It is gray unless its hue is far from that: half of it may be what is behind the smoke. If nothing changes the
+    plates to that side beyond the noise of a pixel, it is gray and as bright as the brightest pixels.
     """
-    lit = []
+    changed = []
     for cells in seen:
         variance = cells.noise.mean(-1) + cells.unknown * np.trace(cells.errors) / 3
-        lit.append(cells.seen[channel_mean(cells.seen - cells.behind) > 3 * np.sqrt(variance)])
-    if any(map(len, lit)):
-        first = np.percentile(np.concatenate(lit), START_PERCENTILE, axis=0)
+        changed.append(cells.seen[side * channel_mean(cells.seen - cells.behind) > 3 * np.sqrt(variance)])
+    if any(map(len, changed)):
+        first = side * np.percentile(side * np.concatenate(changed), START_PERCENTILE, axis=0)
     else:
         first = np.full(3, np.mean([np.percentile(channel_mean(cells.seen), BRIGHT_PERCENTILE) for cells in seen]))
     gray = np.full(3, first.mean())
@@ -202,7 +202,11 @@ def first_source(seen: Sequence[Cells]) -> Picture:
 
 
 def source_in(seen: Sequence[Cells]) -> Picture:
-    """Return the usual J (3,) of the smoke in cells."""
+    """Return the usual J (3,) of the smoke in cells.
+
+    Before a plate without detail, dark smoke could be black and thin as well. Where the search ends so, J is that of
+    what darkens the plates most: such smoke is opaque somewhere.
+    """
     source = first_source(seen)
     for _ in range(SOURCE_ROUNDS):
         total, behind, squares = np.zeros(3), np.zeros(3), 0.0
@@ -219,6 +223,8 @@ def source_in(seen: Sequence[Cells]) -> Picture:
         found = np.maximum(total / max(squares, 1e-12), 0)
         brightness = max(float(found.mean()), MIN_SOURCE)
         source = np.asarray(np.maximum(found, MIN_CHROMA * brightness), np.float32)
+    if found.mean() < MIN_SOURCE:
+        return first_source(seen, -1)
     if any(_has_detail(cells.behind) for cells in seen):
         return source
     return _nearest_to_white(source, behind / max(squares, 1e-12))

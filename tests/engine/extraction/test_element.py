@@ -16,6 +16,7 @@ from smokelift.extraction.element import (
     extract_element,
     first_source,
     shows_transmittance,
+    source_in,
     usual_source,
 )
 from smokelift.extraction.plate import Plate, noise_at
@@ -412,3 +413,10 @@ def test_the_search_starts_from_gray_unless_what_brightens_is_far_from_it(source
     first = first_source([cells])
     assert np.std(first) / first.mean() == pytest.approx(hue, abs=0.1)
     assert first.mean() == pytest.approx(np.mean(source), rel=0.2)
+
+
+def test_dark_smoke_before_a_smooth_sky_is_not_black() -> None:
+    """Smoke that is black and thinner looks the same there; where it is opaque it shows its own light."""
+    sky = replace(plate(0.0), image=np.full((SIZE[1], SIZE[0], 3), 0.6, np.float32))
+    cells = [Cells.of(before(sky, (0.05,) * 3, 8.0, height), sky, (48, 40)) for height in (70, 90)]
+    np.testing.assert_allclose(source_in(cells), 0.05, rtol=0.1)
