@@ -33,7 +33,7 @@ trilinearly, and the record is spread with the same weights.
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.baselines import kernels
+from smokelift.baselines import paper_kernels
 from smokelift.render import device, gpu_kernels
 from smokelift.render import taichi_runtime as taichi
 from smokelift.render.gpu_backend import LightSweeps
@@ -85,7 +85,7 @@ class PaperRenderer:
         gpu_kernels.pack(taichi.upload(density), self._voxels, self._extinction, self.medium.extinction)
         if self._shadows:
             self._shade()
-        kernels.march(
+        paper_kernels.march(
             self._extinction, self._inscatter, self._first, self._step, self._samples,
             self._position, self._grad, self._scattered, self._depth,
             self.medium.extinction, self.domain.voxel_size, self._shadows, self._channels,
@@ -99,7 +99,7 @@ class PaperRenderer:
         of_transmittance = np.sum(of_image * self._background, -1)
         of_every_sample = -self.medium.extinction * self.domain.voxel_size * self._transmittance * of_transmittance
         gradient = taichi.zeros(self.domain.resolution)
-        kernels.accumulate(
+        paper_kernels.accumulate(
             self._position, self._grad, self._samples,
             taichi.upload(of_image @ self._color.T), taichi.upload(of_every_sample), gradient, self._channels,
         )  # fmt: skip
@@ -114,7 +114,7 @@ class PaperRenderer:
         for number, light in enumerate(self._lights):
             self._sweeps.scatter(light, self._extinction, self._lit, 0)
             place = light.direction if isinstance(light, ParallelSweep) else light.position
-            kernels.add_light(
+            paper_kernels.add_light(
                 self._lit, self._inscatter, taichi.vector(place), isinstance(light, ParallelSweep),
                 self.domain.voxel_size, self._channels, number,
             )  # fmt: skip
