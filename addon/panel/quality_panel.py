@@ -74,12 +74,12 @@ def draw_qualities(layout: bpy.types.UILayout, context: bpy.types.Context, smoke
         button.prop_enum(settings, "quality", item.identifier)
         cost = costs.get(item.identifier)
         if cost is not None:
-            seconds, megabytes, lost = cost["seconds"], cost["disk"] / 1e6, cost["lost"]  # None where it is unknown
+            seconds, megabytes = cost["seconds"], cost["disk"] / 1e6
             words = (
                 duration(seconds) if seconds < 3570.0 else _brief(seconds / 3600.0, "h"),
                 _brief(cost["memory"] / 2**30, "G"),
                 f"{megabytes:.0f} M" if megabytes < 99.5 else _brief(megabytes / 1000.0, "G"),
-                "" if lost is None else f"{lost:.1%}" if 0.0005 <= lost < 0.00995 else f"{lost:.0%}",
+                _brief_fraction(cost["lost"]),
             )
             for cell, word in zip(cells, words, strict=True):
                 cell.active = checked and state.done
@@ -122,6 +122,13 @@ def _cells(column: bpy.types.UILayout) -> list[bpy.types.UILayout]:
         cells.append(column.row(align=True))
         left -= fraction
     return [*cells, column.row(align=True)]
+
+
+def _brief_fraction(fraction: float | None) -> str:
+    """A fraction in percent; nothing where it is unknown."""
+    if fraction is None:
+        return ""
+    return f"{fraction:.1%}" if 0.0005 <= fraction < 0.00995 else f"{fraction:.0%}"
 
 
 def _brief(value: float, unit: str) -> str:

@@ -79,6 +79,9 @@ class Reporter:
         return self
 
     def __exit__(self, *error: object) -> None:
+        self._end_bar()
+
+    def _end_bar(self) -> None:
         with _output():
             if self._bar.live.is_started:  # else the bar would leave an empty line
                 self._bar.stop()
@@ -109,12 +112,12 @@ class Reporter:
 
     def finish(self, said: Finding | str, details: Mapping[str, Any]) -> None:
         """Say that the job is done; the details are for programs."""
-        self.__exit__()
+        self._end_bar()
         self.note(said)
 
     def fail(self, text: str, status: int, retryable: bool = False) -> None:
         """Say that the job failed; ``retryable`` if the same command may succeed later."""
-        self.__exit__()
+        self._end_bar()
         self._errors.print(printable(text), markup=False, soft_wrap=True)
 
 
@@ -129,8 +132,8 @@ class JsonReporter(Reporter):
         self._seconds: deque[float] = deque(maxlen=FORECAST_FRAMES)
         self._before = time.monotonic()
 
-    def __exit__(self, *error: object) -> None:
-        """There is no bar."""
+    def _end_bar(self) -> None:
+        """There is none."""
 
     def note(self, said: Finding | str) -> None:
         self._say("note", **_fields(said), doubt=isinstance(said, Finding) and said.doubt)

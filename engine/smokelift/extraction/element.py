@@ -59,7 +59,7 @@ MIN_CHROMA = 0.01
 """Lower bound of a channel of the usual source radiance over its mean, for logarithms."""
 
 START_PERCENTILE = 90
-"""Percentile, of what brightens its plate, that the search for J starts from: what is brighter may be no smoke."""
+"""Percentile, of what changes its plate to one side, that is taken for J: what is farther may be no smoke."""
 
 START_HUE = 0.4
 """Smallest hue, as of `HUE`, of what the search starts from that is not taken for gray: in 40 composed clips of gray
@@ -204,8 +204,8 @@ def first_source(seen: Sequence[Cells], side: int = 1) -> Picture:
 def source_in(seen: Sequence[Cells]) -> Picture:
     """Return the usual J (3,) of the smoke in cells.
 
-    Before a plate without detail, dark smoke could be black and thin as well. Where the search ends so, J is that of
-    what darkens the plates most: such smoke is opaque somewhere.
+    Before a plate with little detail, dark smoke that is opaque in places looks like black smoke that is thin. Where
+    the search ends in black, J is that of what darkens the plates most.
     """
     source = first_source(seen)
     for _ in range(SOURCE_ROUNDS):

@@ -4,7 +4,7 @@ The first of these that applies: what an alpha channel says; what the scene give
 (`given_background`); one color, if the whole file makes it the likeliest; the picture that the clear frames show
 (`clear_picture`); black, if they show next to nothing. If the camera moves before a picture, the frames are registered
 (`camera_motion`), or the clip is refused; one color is the same wherever it points. The clip's noise is measured first,
-on what cannot be smoke (`noise`). Strokes of the scene change what was found (`strokes`); an alpha channel leaves
+on what cannot be smoke (`noise`). Strokes of the scene change what was found (`stroked`); an alpha channel leaves
 nothing for them to say.
 
 The likeliest of one color and a picture: a block of the picture is clear, and shows its background within the noise, or

@@ -22,6 +22,7 @@ from tests.engine.velocity.known_motions import (
     mean_motion,
     positions,
     rotation,
+    structured_density,
     translation,
     uniform,
     voxels_a_frame,
@@ -72,8 +73,8 @@ def test_an_estimate_of_one_view_is_smoother_and_corrected_by_its_pictures(estim
         np.testing.assert_array_equal(component, wanted)
 
 
-def test_marked_inflow_is_no_motion():
-    """On a coarser grid, which inlets are put onto."""
+def test_a_coarser_grid_knows_inlets():
+    """They are put onto it: marked voxels are not taken for motion."""
     before, after, truth = translation((0.8, 0.4, 1.2), (44, 44, 44), 10.0)
     coarse = VelocitySettings(coarsening=1, solver=SMOOTH.solver)
     inflow = np.zeros(after.shape, bool)
@@ -119,6 +120,17 @@ def test_number_of_threads_does_not_matter(estimator):
     one = estimator.estimate(DensityPair(before, after, DT, VOXEL))
     for a, b in zip(two.faces, one.faces, strict=True):
         np.testing.assert_array_equal(a, b)
+
+
+def test_marked_inflow_is_no_motion():
+    """Smoke that stays where it is, and an inlet in it."""
+    x, y, z = positions(SHAPE)
+    before, source = structured_density(x, y, z), (x**2 + y**2 < 9) & (abs(z + 6) < 2)
+    plain, marked = (
+        np.linalg.norm(estimate_velocity(before, before + 0.3 * source, DT, VOXEL, inflow=inflow).centres())
+        for inflow in (None, source)
+    )
+    assert marked < 0.1 * plain
 
 
 def test_a_true_prediction_is_trusted_and_a_wrong_one_is_not():
