@@ -1,4 +1,4 @@
-// The linearized estimate of a velocity: a quadratic function of the face velocities, in cells per frame.
+// The linearized estimate of a velocity (equations 11 to 13): a quadratic function of faces, voxels per frame.
 #pragma once
 
 #include "grid.h"

@@ -1,6 +1,6 @@
 // How light reaches the voxels, for one light: J = E p V, and the derivative of that. E is the energy of the
-// light, p the phase function times albedo, V the transmittance from the light to the voxel: eq. 4 and 5 of
-// Cen, Zhang and Liang (2023).
+// light, p the phase function times albedo, V the transmittance from the light to the voxel: equations 4 and
+// 5 of Cen, Zhang and Liang (2023).
 #pragma once
 
 #include "voxels.h"
@@ -16,7 +16,7 @@ struct Phase {
     float albedo = 1, anisotropy = 0;
 };
 
-// Parallel light. In the planes of voxels across its dominant axis a ray moves `slope` voxels a plane along
+// Parallel light. In the planes of voxels across its dominant axis a ray moves `slope` voxels per plane along
 // the two other axes; `first` is the number of the first plane in the grid of which this one is a part.
 struct ParallelLight {
     std::array<float, 3> direction{}; // of travel, unit length
@@ -49,7 +49,7 @@ void shade(const Voxels &medium, const Spans &spans, const Phase &phase, const P
            Workers &workers);
 
 // Adds what J's derivative (the J channels of `gradient`) says of the extinction along the light's way to the
-// extinction channel of `gradient`. `scratch` is one float a voxel. Parallel light that has made all of J
+// extinction channel of `gradient`. `scratch` is one float per voxel. Parallel light that has made all of J
 // needs none, and no sweep for it, but overwrites J's derivative.
 void shade_adjoint(const Voxels &medium, const Voxels &gradient, const Voxels &scratch, const Spans &spans,
                    const Phase &phase, const ParallelLight &light, Workers &workers);

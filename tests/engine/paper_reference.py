@@ -1,4 +1,4 @@
-"""The Riemann sum of the paper's eq. 1-5 in float64 and plain NumPy, restated from the text and not from the kernels.
+"""The Riemann sum of the paper's equations 1-5 in float64 and NumPy, from the text and not from the kernels.
 
 Like ``renderer_reference`` it takes complex densities, for derivatives by a complex step.
 """

@@ -96,7 +96,7 @@ def march(
     shadows: ti.template(),
     channels: ti.template(),
 ):
-    """Algorithm 2: the picture of every ray, and the terms of eq. 9 in its part of the record.
+    """Algorithm 2: the picture of every ray, and the terms of equation 9 in its part of the record.
 
     ``samples[row, column]`` holds where the ray's part begins and its number of samples, from the camera on.
     """
@@ -117,7 +117,7 @@ def march(
                 for m in ti.static(range(2 * channels if shadows else channels)):
                     glow[m] += weight * inscatter[index[0], index[1], index[2], m]
             tau = ti.exp(-optical_depth)
-            # eq. 8: tau' = -tau sigma_t (s d), kappa' = sigma_t; eq. 10: J' = -sigma_t (J x way)
+            # equation 8: tau' = -tau sigma_t (s d), kappa' = sigma_t; equation 10: J' = -sigma_t (J x way)
             reach = 1.0 - kappa * d * s
             for c in ti.static(range(channels)):
                 radiance[c] += tau * kappa * glow[c] * d
@@ -146,7 +146,7 @@ def accumulate(
 ):
     """Algorithm 3, lines 5 to 13: densityGrad from the record, weighted with dloss / dL of each ray.
 
-    ``of_every_sample[row, column]`` is what eq. 7 gives to every sample of a ray.
+    ``of_every_sample[row, column]`` is what equation 7 gives to every sample of a ray.
     """
     size = ti.Vector([gradient.shape[0], gradient.shape[1], gradient.shape[2]])
     for row, column in ti.ndrange(samples.shape[0], samples.shape[1]):

@@ -11,7 +11,7 @@ paper's derivative is none voxel by voxel, so in thick smoke the loss falls at f
 any rate.
 
 Velocity, algorithm 5: one grid, one linearization around rest, first-order smoothness, primal-dual. It minimizes, over
-velocities u without divergence in voxels per frame,
+velocities u without divergence in voxels per frame (equations 11 to 13),
 
     sum (after - before + g . u)^2 / s^2 + smoothness * sum |grad u|^2 + kinetic * sum |u|^2
 

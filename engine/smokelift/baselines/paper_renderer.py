@@ -1,32 +1,32 @@
-"""The paper's own renderer and derivative (its eq. 1-10, algorithm 2), the baseline beside the exact one.
+"""The paper's own renderer and derivative (its equations 1-10, algorithm 2), the baseline beside the exact one.
 
-Picture, eq. 1-5: the Riemann sum over samples s from the camera on, a step d apart,
+Picture, equations 1-5: the Riemann sum over samples s from the camera on, a step d apart,
 
     L   = sum_s tau_s kappa_s J_s d + tau B,    tau_s = exp(-sum_{r<s} kappa_r d),   kappa = sigma_t rho
     J_s = albedo sum_l p_g(w, w_l) E_l V_l      V_l: transmittance to light l; tau: of the whole ray
 
-Derivative, eq. 6-10, to the letter. There is one "derivative with respect to density", kappa' = sigma_t: each quantity
-is differentiated as if the density rose by the same amount everywhere in the box.
+Derivative, equations 6-10, to the letter. There is one "derivative with respect to density", kappa' = sigma_t: each
+quantity is differentiated as if the density rose by the same amount everywhere in the box.
 
-    eq. 8         tau_s' = -tau_s sigma_t D_s     D_s: length of the way in the box from the sample to the camera
-    eq. 7         L_ri'  = -tau B sigma_t d       each sample's part of the sum over the path
-    eq. 10, 7, 8  J_s'   = -sigma_t albedo sum_l p_g E_l V_l P_l    P_l: way of light l in the box to the sample
-    eq. 9         L_ss'  = (tau_s' kappa_s + tau_s sigma_t) J_s d + tau_s kappa_s J_s' d    each sample's part
+    equation 8          tau_s' = -tau_s sigma_t D_s     D_s: length of the way in the box from the sample to the camera
+    equation 7          L_ri'  = -tau B sigma_t d       each sample's part of the sum over the path
+    equations 10, 7, 8  J_s'   = -sigma_t albedo sum_l p_g E_l V_l P_l    P_l: way of light l in the box to the sample
+    equation 9          L_ss'  = (tau_s' kappa_s + tau_s sigma_t) J_s d + tau_s kappa_s J_s' d    each sample's part
 
-So eq. 10 does hold the shadow along the light's path; it costs a known length and no sweep. Algorithm 2 credits every
-term to the sample where it is evaluated (the record gradRec of positions and terms). Algorithm 3 adds the record up
-in the voxels around. It follows that
+So equation 10 does hold the shadow along the light's path; it costs a known length and no sweep. Algorithm 2 credits
+every term to the sample where it is evaluated (the record gradRec of positions and terms). Algorithm 3 adds the record
+up in the voxels around. It follows that
 
 - the voxels' sum is the derivative for density added alike everywhere, for every pixel and any density. It is exact to
   rounding but for P_l: that is a length, while the sweep for V_l fades over the last half voxel at the box's sides;
-- absorption alone (eq. 7) is exact voxel by voxel, and so is everything in the limit of thin smoke;
+- absorption alone (equation 7) is exact voxel by voxel, and so is everything in the limit of thin smoke;
 - else a voxel's number is not its partial derivative. What it does to the samples behind it and in its shadow is
   booked there, and what the voxels before it do to its own light is booked to it. Where kappa (D + P) > 1 the sign
   turns: a voxel in thick smoke seems to darken the picture whatever it does.
 
-Slips of the listing that are mended: line 10 lacks d; line 12 lacks d and has tau(x_a, x_u) where eq. 7 has
+Slips of the listing that are mended: line 10 lacks d; line 12 lacks d and has tau(x_a, x_u) where equation 7 has
 tau(x_a, x). The text leaves open what is chosen here: d is a voxel's edge, and samples lie in the middle of their
-steps; the light's transmittance is a volume made once a picture, by the exact renderer's sweeps; volumes are read
+steps; the light's transmittance is a volume made once per picture, by the exact renderer's sweeps; volumes are read
 trilinearly, and the record is spread with the same weights.
 """
 

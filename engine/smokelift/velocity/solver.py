@@ -50,7 +50,7 @@ class ProjectedCG:
 
 @dataclass(frozen=True)
 class PrimalDual:
-    """Chambolle and Pock's splitting, as in algorithm 5 of Cen, Zhang and Liang (2023)."""
+    """Chambolle and Pock's splitting, as in algorithm 5 of Cen, Zhang and Liang (2023), equations 14 to 16."""
 
     sigma: float = 0.1
     tau: float = 10.0
@@ -82,10 +82,10 @@ class PrimalDual:
         fitted, relaxed, dual = u.copy(), u, np.zeros_like(u)
         converged = False
         while not converged and figures["iterations"] < self.iterations:
-            # X' = X + sigma Y - sigma prox_f(X / sigma + Y)
+            # equation 14: X' = X + sigma Y - sigma prox_f(X / sigma + Y)
             proximal(dual / np.float32(self.sigma) + relaxed, fitted)
             dual += np.float32(self.sigma) * (relaxed - fitted)
-            # u' = prox_g(u - tau X'), the projection
+            # u' = prox_g(u - tau X'), which is the projection (equation 16)
             stepped = _faces(u - np.float32(self.tau) * dual, start)
             before, u = u, _flat(_core.project(stepped, start.walls, passes=1)[0])
             # Y' = u' + theta (u' - u)
@@ -100,7 +100,7 @@ class PrimalDual:
 
 
 class _Proximal:
-    """The proximal operator of the quadratic: argmin f(v) + sigma/2 |v - xi|^2, in the projection's inner product.
+    """Equation 15, in the projection's inner product: prox(xi) = argmin f(v) + sigma/2 |v - xi|^2.
 
     That is (A + sigma/2 w) v = b + sigma/2 w xi, by conjugate gradients with the diagonal as preconditioner. The
     weights w are 1/2 on open sides, where a face belongs to half a voxel, and 1 elsewhere.
