@@ -109,7 +109,7 @@ DETAIL_MARGIN = 16
 
 
 @dataclass(frozen=True, eq=False)
-class ClearPicture:
+class CleanPlate:
     """The linear background (rows, columns, 3) of pictures of one exposure.
 
     ``known`` (rows, columns) are the pixels that some pictures show without smoke, ``clear`` (frames, rows, columns)
@@ -124,7 +124,7 @@ class ClearPicture:
     correction: Picture
 
 
-def clear_picture(proxy: Proxy, noise: Noise, painted: Mask | None = None) -> ClearPicture:
+def clean_plate(proxy: Proxy, noise: Noise, painted: Mask | None = None) -> CleanPlate:
     """Return the background of pictures of one exposure, whose file has a ``noise``.
 
     Where smoke is ``painted`` (rows, columns), what never changes is smoke, and no frame shows what is behind it.
@@ -173,7 +173,7 @@ def clear_picture(proxy: Proxy, noise: Noise, painted: Mask | None = None) -> Cl
     correction = _correction(image, known, steady, weights, smoke)
     finer_than = DETAIL / proxy.scale
     whole, contrast = _completed(image + correction, known, mean, brightness, brightens, finer_than, weights)
-    return ClearPicture(whole, known, clear, contrast, correction)
+    return CleanPlate(whole, known, clear, contrast, correction)
 
 
 def _most_changed(encoded: Picture, seen: Mask) -> Picture:
@@ -309,7 +309,7 @@ def _completed(
     finer_than: float,
     weights: Picture,
 ) -> tuple[Picture, Picture]:
-    """Return a linear plate with the unknown filled in, and the ``contrast`` of `ClearPicture`.
+    """Return a linear plate with the unknown filled in, and the ``contrast`` of `CleanPlate`.
 
     ``mean`` (rows, columns, 3) is that over time, in sRGB values. Smoke of transmittance T and brightness J makes
     J + T (B - J) of a background B. The mean's coarse part, compared with the continued surroundings, gives T; its
@@ -339,7 +339,7 @@ def _most_detail(detail: Picture, known: Mask) -> Picture:
     return np.quantile(np.abs(detail[known]), DETAIL_QUANTILE, axis=0) if known.any() else np.zeros(3, np.float32)
 
 
-def whole_plate(clip: Clip, proxy: Proxy, found: ClearPicture) -> Picture:
+def whole_plate(clip: Clip, proxy: Proxy, found: CleanPlate) -> Picture:
     """Return the linear background (rows, columns, 3) ``found`` on a proxy at full size, made of the same frames."""
     if found.image.shape[1::-1] == clip.size:
         return found.image

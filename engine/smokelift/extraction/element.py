@@ -153,8 +153,8 @@ def extract_element(picture: Picture, plate: Plate, source: Picture, size: tuple
     own = np.square(BRIGHTNESS_RANGE * smooth).mean(-1)
     noise = np.square(noise_at(small, plate)).mean(-1) * (columns * rows / plate.confidence.size)
     noise += np.square(MODEL_ERROR * passed).mean(-1)
-    kept = np.asarray(weight * own / np.maximum(own + noise, MIN_VARIANCE), np.float32)
-    return Element(smooth + kept[..., None] * (small - passed - smooth), clear, deviation, shared, weight)
+    fine_weight = np.asarray(weight * own / np.maximum(own + noise, MIN_VARIANCE), np.float32)
+    return Element(smooth + fine_weight[..., None] * (small - passed - smooth), clear, deviation, shared, weight)
 
 
 def source_of(fields: Picture, source: Picture) -> Picture:

@@ -2,7 +2,7 @@
 
 The first of these that applies: what an alpha channel says; what the scene gives, a color as it goes on beside the mask
 (`given_background`); one color, if the whole file makes it the likeliest; the picture that the clear frames show
-(`clear_picture`); black, if they show next to nothing. If the camera moves before a picture, the frames are registered
+(`clean_plate`); black, if they show next to nothing. If the camera moves before a picture, the frames are registered
 (`camera_motion`), or the clip is refused; one color is the same wherever it points. The clip's noise is measured first,
 on what cannot be smoke (`noise`). Strokes of the scene change what was found (`stroked`); an alpha channel leaves
 nothing for them to say.
@@ -22,7 +22,7 @@ import numpy as np
 
 from smokelift.checks import Mask
 from smokelift.extraction.camera_motion import CameraMotion, Texture, find_motion, motion_before
-from smokelift.extraction.clear_picture import ClearPicture, clear_picture, spread_out, whole_plate
+from smokelift.extraction.clean_plate import CleanPlate, clean_plate, spread_out, whole_plate
 from smokelift.extraction.given_background import (
     PAINTED,
     Strokes,
@@ -48,9 +48,9 @@ from smokelift.footage.images import (
 from smokelift.footage.noise import (
     EIGHT_BIT_STEP,
     Noise,
-    block_means,
     lasting_noise,
     median_of_seen,
+    noise_block_means,
     noise_of,
     spread_about,
 )
@@ -100,7 +100,7 @@ blocks. Public clips before one color have up to .02 (docs/clips.md)."""
 MIN_SHOWN_FRACTION = 0.25
 """Smallest fraction of the blocks that must show the one color at some time."""
 
-MIN_STILL_FRACTION = 0.9
+MIN_UNCHANGED_FRACTION = 0.9
 """Smallest fraction of the frames in which an object is within half of the limit of its median: smoke wavers more."""
 
 MIN_SEEN_FRACTION = 0.99
@@ -261,7 +261,7 @@ def _estimated(clip: Clip, moves: bool, smoke: Mask | None, motion: CameraMotion
     source: Source = "color"
     if color is None:
         # what a mask hides is no smoke: where it never changes, it is background
-        shown, source = part.with_still(), "picture"
+        shown, source = part.with_unchanged(), "picture"
         plate = _picture(clip, shown, white, smoke)
         if plate.confidence.mean() < MIN_KNOWN * shown.seen.any(0).mean():
             # fog drifts over all of the file: treat it as filmed before black
@@ -277,7 +277,7 @@ def _picture(clip: Clip, proxy: Proxy, white: Picture, smoke: Mask | None) -> Pl
     rows, columns = proxy.seen.shape[1:]
     painted = None if smoke is None else area_average(smoke, columns, rows) >= PAINTED
     noise = proxy.noise_about(median_of_seen(proxy.pictures), white)
-    picture = clear_picture(proxy, noise, painted)
+    picture = clean_plate(proxy, noise, painted)
     known = spread_out(picture.known, clip.size).astype(np.float32)
     image, noise = whole_plate(clip, proxy, picture), proxy.noise_about(picture.image, white)
     return Plate(image, known, noise, continuation_errors(picture.image, picture.known))
@@ -299,7 +299,7 @@ def _of_one_color(clip: Clip, proxy: Proxy, color: Picture, objects: Mask, white
         clear[:, objects] = _within(proxy.encoded[:, objects] - linear_to_srgb(own), limit)
         known = np.ones(objects.shape, np.bool_)
         picture = whole_plate(
-            clip, proxy, ClearPicture(image, known, clear, known.astype(np.float32), np.zeros_like(image))
+            clip, proxy, CleanPlate(image, known, clear, known.astype(np.float32), np.zeros_like(image))
         )
         whole = np.where(spread_out(objects, clip.size)[..., None], picture, whole)
     return Plate(whole, np.ones(clip.size[::-1], np.float32), noise)
@@ -333,7 +333,7 @@ def _likeliest(proxy: Proxy, white: Picture) -> _Hypothesis:
     for value in values:
         picture = np.minimum(picture, _cost(_within(values - value, limit) | empty, goes_on, jump))
     table = [_Hypothesis(float(picture.mean()) + jump, None, np.zeros((rows, columns), np.bool_), 0.0)]
-    still = _within(values - median_of_seen(values), limit / 2).mean(0) >= MIN_STILL_FRACTION
+    unchanged = _within(values - median_of_seen(values), limit / 2).mean(0) >= MIN_UNCHANGED_FRACTION
     for candidate in _candidates(values, limit):
         clear = _within(values - candidate, limit)
         shows = clear.any(0)
@@ -350,7 +350,7 @@ def _likeliest(proxy: Proxy, white: Picture) -> _Hypothesis:
         color = srgb_to_linear(values[clear].mean(0, dtype=np.float64))
         color[linear_to_srgb(color) < EIGHT_BIT_STEP / 2] = 0
         objects = np.zeros_like(visible)
-        objects[visible] = stands & still
+        objects[visible] = stands & unchanged
         total = float(cost.mean()) + sides * float((~clear).sum(0).mean())
         table.append(_Hypothesis(total, color, spread_out(objects, (columns, rows)), float(clear.mean())))
     return min(table, key=lambda each: each.cost)
@@ -362,7 +362,7 @@ def color_around(picture: Picture) -> tuple[float, float, float] | None:
     One picture does not show what never changes, so all that has another color may be smoke. Smoke may enter from one
     side, and cover more of the picture than its background does.
     """
-    linear = block_means(picture[None])[0]
+    linear = noise_block_means(picture[None])[0]
     blocks = linear_to_srgb(linear)
     sides = [(values[0], values[-1], values[:, 0], values[:, -1]) for values in (blocks, linear)]
     color = np.median(np.concatenate(sides[0]), axis=0)

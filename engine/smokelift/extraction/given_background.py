@@ -2,7 +2,7 @@
 
 Strokes say where smoke is, where none ever is, and where the background shows as it is. They add to what the clip
 shows, wherever the background came from. A given plate is unknown where smoke is painted; of one that frames show clear
-at times, only what never changes is (`clear_picture`). What is unknown is continued from around it. What is not smoke,
+at times, only what never changes is (`clean_plate`). What is unknown is continued from around it. What is not smoke,
 and what is behind it, is known: the clip's own median over time.
 """
 

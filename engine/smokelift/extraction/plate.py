@@ -16,13 +16,13 @@ from smokelift.footage.images import Picture, area_average, brightest_channel, l
 from smokelift.footage.noise import (
     EIGHT_BIT_STEP,
     Noise,
-    block_means,
     clipped_black,
     gain_of,
     lasting_noise,
     linear_excess,
     linear_per_srgb,
     noise_about,
+    noise_block_means,
     small,
     some_blocks,
 )
@@ -163,7 +163,7 @@ def _measured(plate: Plate, reach: Picture, clip: Clip) -> Plate:
             closer = (apart < distance) & np.isfinite(deviation[..., 0][edge])  # never where it is hidden
             nearest[closer], distance[closer] = away[closer], apart[closer]
         single.append(some_blocks(deviation))
-        blocks.append(block_means(deviation[None])[0])
+        blocks.append(noise_block_means(deviation[None])[0])
     samples = np.stack(single), np.stack(blocks)
     if plate.images is not None:
         return replace(plate, noise=noise_about(*samples))
@@ -183,7 +183,7 @@ def _measured(plate: Plate, reach: Picture, clip: Clip) -> Plate:
 def _less(samples: tuple[Picture, Picture], change: Picture) -> tuple[Picture, Picture]:
     """Samples of deviations, as `noise_about` takes them, from a background that is changed, in sRGB values."""
     single, blocks = samples
-    return single - some_blocks(change), blocks - block_means(change[None])
+    return single - some_blocks(change), blocks - noise_block_means(change[None])
 
 
 def noise_at(picture: npt.ArrayLike, plate: Plate) -> Picture:

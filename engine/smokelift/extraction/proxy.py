@@ -31,7 +31,7 @@ from smokelift.footage.noise import (
 )
 
 PROXY_SIDE = 480
-"""Pixels along the longer side: lengths in `clear_picture` hold at some hundred (docs/experiments/background.md)."""
+"""Pixels along the longer side: lengths in `clean_plate` hold at some hundred (docs/experiments/background.md)."""
 
 FRAMES = 32
 """Largest number of frames of the file, and of the clip. A half is enough for a median, a third for a false-alarm rate
@@ -40,7 +40,7 @@ of 1e-3 if every second pair of smoke's samples is alike."""
 NOISE_FRAMES = 16
 """Frames of the clip that white noise is measured on."""
 
-MAX_STILL_CHANGE = np.float32(4 / 255)
+MAX_INVISIBLE_CHANGE = np.float32(4 / 255)
 """Change in sRGB values up to which a pixel counts as unchanged."""
 
 SAME_SHOT, STEADY = 0.25, 0.5
@@ -150,14 +150,14 @@ class Proxy:
         sides = [_alike(tiny[one], tiny[other]) for one, other in pairs] or [0.0]
         return sides[0], sides[-1]
 
-    def with_still(self) -> Proxy:
+    def with_unchanged(self) -> Proxy:
         """Return `evened` frames with what a mask hides, and never changes, as it was filmed: there is background."""
         if self.seen.all():
             return self
         encoded = linear_to_srgb(self.filmed)
-        still = (np.abs(encoded - np.median(encoded, axis=0)) < MAX_STILL_CHANGE).all((0, -1))
-        pictures = np.where((still & ~self.seen)[..., None], self.filmed, self.pictures)
-        return replace(self, pictures=pictures, seen=self.seen | still)
+        unchanged = (np.abs(encoded - np.median(encoded, axis=0)) < MAX_INVISIBLE_CHANGE).all((0, -1))
+        pictures = np.where((unchanged & ~self.seen)[..., None], self.filmed, self.pictures)
+        return replace(self, pictures=pictures, seen=self.seen | unchanged)
 
     def only(self, which: NDArray[np.intp]) -> Proxy:
         """Return some of the frames, by their indices here."""
@@ -214,7 +214,7 @@ def _alike(one: Picture, other: Picture) -> float:
     encoded = linear_to_srgb(one)
 
     def alike(picture: Picture) -> float:
-        return float((brightest_channel(np.abs(linear_to_srgb(picture) - encoded)) < MAX_STILL_CHANGE).mean())
+        return float((brightest_channel(np.abs(linear_to_srgb(picture) - encoded)) < MAX_INVISIBLE_CHANGE).mean())
 
     found = alike(other)
     return found if found >= STEADY else max(found, alike(other / gain_of(other, one)))

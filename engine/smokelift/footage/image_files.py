@@ -109,8 +109,8 @@ def pq_to_linear(signal: npt.ArrayLike) -> Array:
     """Decode the perceptual quantizer (BT.2100 and SMPTE ST 2084, EOTF)."""
     m1, m2, c1, c2, c3 = 2610 / 16384, 2523 / 4096 * 128, 3424 / 4096, 2413 / 4096 * 32, 2392 / 4096 * 32
     e = np.maximum(np.asarray(signal, np.float64), 0.0) ** (1 / m2)
-    screen = (np.maximum(e - c1, 0.0) / (c2 - c3 * e)) ** (1 / m1)
-    return np.asarray(screen / (203 / 10_000), np.float32)  # reference white of 203 cd/m2 (BT.2408)
+    shown = (np.maximum(e - c1, 0.0) / (c2 - c3 * e)) ** (1 / m1)
+    return np.asarray(shown / (203 / 10_000), np.float32)  # reference white of 203 cd/m2 (BT.2408)
 
 
 DECODERS: Mapping[Encoding, Decoder] = {

@@ -38,7 +38,7 @@ MEDIAN_OF_BLOCK = 0.955
 degrees of freedom, and the median of chi-squared is (1 - 2 / (9 k))^3 of its mean (by definition)."""
 
 LARGEST_LASTING = np.float32(4 / 255)
-"""Largest lasting noise, in sRGB values: a codec's changes are up to twice as large (`clear_picture.DRIFT`)."""
+"""Largest lasting noise, in sRGB values: a codec's changes are up to twice as large (`clean_plate.DRIFT`)."""
 
 MIN_SLOW = 0.95 * float(LARGEST_LASTING)
 """Spread about the median over time, in sRGB values, from which on it is wider than that of noise: slow smoke."""
@@ -114,7 +114,7 @@ EIGHT_BIT_NOISE = Noise(np.zeros(3, np.float32), np.full(3, MIN_SPREAD), float(E
 """Noise of footage as clean as eight bits allow (by definition)."""
 
 
-def block_means(pictures: Picture) -> Picture:
+def noise_block_means(pictures: Picture) -> Picture:
     """Return the means over blocks of pictures (frames, rows, columns, 3); edges that fill no block are left out."""
     size = min(BLOCK, *pictures.shape[1:3])
     frames, rows, columns = len(pictures), pictures.shape[1] // size, pictures.shape[2] // size
@@ -196,7 +196,7 @@ def noise_about(deviations: Picture, blocks: Picture) -> Noise:
     """Return the noise of pictures before a known background.
 
     Both arguments (frames, rows, columns, 3) are made of the differences from it in sRGB values: ``deviations`` are
-    `some_blocks` of them, ``blocks`` their `block_means`.
+    `some_blocks` of them, ``blocks`` their `noise_block_means`.
     """
     return noise_of(white_noise(deviations), spread_about(blocks), BLOCK**2)
 

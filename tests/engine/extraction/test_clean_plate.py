@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from smokelift.extraction.clear_picture import _correction, clear_picture
+from smokelift.extraction.clean_plate import _correction, clean_plate
 from smokelift.extraction.find_background import find_background
 from smokelift.extraction.matte import matte
 from smokelift.extraction.plate import Plate
@@ -144,7 +144,7 @@ def test_haze_that_stands_beside_smoke_is_no_part_of_a_smooth_wall(tmp_path) -> 
     haze = 0.02 * np.exp(-0.5 * ((away - 5) / 3) ** 2)
     flat = np.full((HEIGHT, WIDTH, 3), 0.2, np.float32)
     clip = film(tmp_path, flat, lambda n: np.where(away < 5, np.random.default_rng(n).uniform(0.3, 0.9), haze), 0.8)
-    found = clear_picture(Proxy.of(clip), lasting_noise(1 / 255))
+    found = clean_plate(Proxy.of(clip), lasting_noise(1 / 255))
     beside = (away > 5) & (away < 10)
     assert found.known[beside].all()
     assert codes_apart(found.image, flat)[beside].mean() < 1

@@ -62,7 +62,7 @@ def plate_of(image: Picture, confidence: float = 1.0) -> Plate:
     return Plate(image, np.full(image.shape[:2], confidence, np.float32), EIGHT_BIT_NOISE)
 
 
-def clear_picture(plate: Picture) -> Picture:
+def smoke_before(plate: Picture) -> Picture:
     """The blob before a plate, without noise."""
     clear = TRANSMITTANCE[..., None]
     return np.asarray((1 - clear) * RADIANCE + clear * plate)
@@ -95,7 +95,7 @@ def fields_of(element: Element) -> tuple[Picture, ...]:
     return element.radiance, element.transmittance, element.deviation, element.weight
 
 
-PICTURE = filmed(clear_picture(WALL))
+PICTURE = filmed(smoke_before(WALL))
 """The blob before the wall."""
 
 
@@ -112,7 +112,7 @@ def before_wall() -> Element:
 @pytest.mark.parametrize("size", [(192, 144), (128, 96), (62, 46)], ids=str)
 def test_a_blob_is_found_before_a_plate(plate, size) -> None:
     """By the plate's detail, or by its color, to .015 in T and in what smoke sends; over its plate it is seen."""
-    picture = filmed(clear_picture(plate))
+    picture = filmed(smoke_before(plate))
     found = extracted(picture, plate_of(plate), size=size)
     true = area_average(TRANSMITTANCE, *size)
     sent = area_average((1 - TRANSMITTANCE)[..., None] * RADIANCE, *size)
@@ -153,7 +153,7 @@ def test_before_black_the_picture_is_what_smoke_sends(before_wall) -> None:
     """The middle of the wall is black: T is not seen there, and its deviation says so."""
     plate = wall()
     plate[:, 48:144] = 0
-    picture = filmed(clear_picture(plate))
+    picture = filmed(smoke_before(plate))
     found = extracted(picture, plate_of(plate))
     dark = np.zeros((ROWS, COLUMNS), np.bool_)
     dark[:, 56:136] = True
@@ -171,7 +171,7 @@ def test_detail_that_a_codec_takes_from_thin_smoke_is_no_opacity() -> None:
     fine, coarse = blurred(grain, 0.8), blurred(grain[::-1], 5.0)
     held = np.maximum(0.3 * (1 + 0.3 * coarse / coarse.std()), 0.03) * np.ones(3, np.float32)
     plate = np.maximum(held + 0.06 * fine / fine.std(), 0.01).astype(np.float32)
-    picture = filmed(clear_picture(np.where(TRANSMITTANCE[..., None] < 0.97, held, plate)))
+    picture = filmed(smoke_before(np.where(TRANSMITTANCE[..., None] < 0.97, held, plate)))
     sharp, kept = (extracted(picture, replace(plate_of(plate), finest=finest)) for finest in (2.0, 6.0))
     assert rms(kept.transmittance - TRANSMITTANCE) < 0.6 * rms(sharp.transmittance - TRANSMITTANCE)
 
@@ -234,7 +234,7 @@ def test_confidence_says_where_errors_count(before_wall) -> None:
 def test_exposure_scales_the_radiance_alone(stops) -> None:
     """Of a picture without noise; the noise is even in code values, not in light."""
     gain = np.float32(2.0**stops)
-    size, picture = (48, 36), clear_picture(WALL)
+    size, picture = (48, 36), smoke_before(WALL)
     silent = Plate(WALL, np.ones((ROWS, COLUMNS), np.float32), lasting_noise(0.0))
     one = extracted(picture, silent, size=size)
     other = extracted(picture * gain, replace(silent, image=WALL * gain), SOURCE * gain, size)
@@ -269,7 +269,7 @@ def test_any_size_is_taken(shape) -> None:
     rows, columns = shape
     part = slice(48, 48 + rows), slice(0 if columns == COLUMNS else 80, columns if columns == COLUMNS else 80 + columns)
     plate = WALL[part]
-    picture = clear_picture(WALL)[part]
+    picture = smoke_before(WALL)[part]
     for size in {(columns, rows), (max(1, columns // 2), max(1, rows // 2)), (1, 1)}:
         found = extracted(picture, plate_of(plate), size=size)
         assert found.radiance.shape == (size[1], size[0], 3)
@@ -399,7 +399,7 @@ def test_the_source_is_found_from_the_pictures(brightness, image) -> None:
 def test_smoke_counts_by_its_weight_in_the_source() -> None:
     """A clip's clear frames say nothing of the light."""
     image = PLATES["wall"]
-    smoky, empty = (filmed(clear_picture(image)), plate_of(image)), (filmed(image), plate_of(image))
+    smoky, empty = (filmed(smoke_before(image)), plate_of(image)), (filmed(image), plate_of(image))
     alone = usual_source([smoky], (48, 36))
     np.testing.assert_allclose(usual_source([smoky, empty, empty], (48, 36)), alone, rtol=0.05)
 

@@ -89,8 +89,8 @@ def test_a_camera_sees_its_own_plate_and_others_its_mean(folder) -> None:
         scene = Scene(camera=CAMERA, clip=clip, background=Background(image=image))
         own = background_picture(scene)
         assert codes_apart(own, passing_wall()[:, 4 : 4 + WIDTH]).max() < 6
-        aside = replace(CAMERA, matrix=look_at_matrix((1.0, -4.0, 1.0), (0.0, 0.0, 1.0), (0.0, 0.0, 1.0)))
-        np.testing.assert_allclose(background_picture(scene, aside), own.reshape(-1, 3).mean(0), rtol=1e-5)
+        turned = replace(CAMERA, matrix=look_at_matrix((1.0, -4.0, 1.0), (0.0, 0.0, 1.0), (0.0, 0.0, 1.0)))
+        np.testing.assert_allclose(background_picture(scene, turned), own.reshape(-1, 3).mean(0), rtol=1e-5)
         part = background_picture(scene, CAMERA.cropped(2, 3, 10, 8))
         np.testing.assert_allclose(part, own[3:11, 2:12], rtol=1e-5)
 

@@ -123,7 +123,7 @@ def pixels(**what):
     return seen, np.zeros_like(seen)
 
 
-def fire_share(*seen) -> float:
+def fire_fraction(*seen) -> float:
     """The share of the pixels that is fire."""
     hot = hot_pixels(*seen)
     return hot.fraction * hot.burn
@@ -136,7 +136,7 @@ def fire_share(*seen) -> float:
 )
 def test_a_flame_is_fire_whatever_the_smoke_is(what) -> None:
     """Also a core that is clipped to yellow, which is no bright smoke."""
-    assert 0.01 < fire_share(*pixels(**what)) < (1 if what else 0.3)
+    assert 0.01 < fire_fraction(*pixels(**what)) < (1 if what else 0.3)
 
 
 @pytest.mark.parametrize(
@@ -158,22 +158,22 @@ def test_fire_of_which_little_is_bright_may_be_fire(bright, burns, may_burn) -> 
     ids=["no flame", "orange smoke", "white light"],
 )
 def test_what_is_no_fire(what) -> None:
-    assert fire_share(*pixels(**what)) == 0
+    assert fire_fraction(*pixels(**what)) == 0
 
 
 def test_a_bright_wall_behind_thin_smoke_is_no_fire() -> None:
     wall = np.broadcast_to(np.float32((0.9, 0.5, 0.2)), (100, 3))
     colors = np.concatenate([0.9 * wall + 0.006, np.full((50, 3), 0.06, np.float32)])
     behind = np.concatenate([wall, np.zeros((50, 3), np.float32)])
-    assert fire_share(colors, behind) == 0
+    assert fire_fraction(colors, behind) == 0
 
 
 def test_what_is_added_to_the_background_counts() -> None:
     sky, land = np.full((90, 3), 0.45, np.float32), np.full((10, 3), 0.02, np.float32)
     flames = np.broadcast_to(np.float32((0.95, 0.35, 0.08)), (10, 3))
     seen = np.concatenate([0.7 * sky + 0.02, flames])
-    assert fire_share(seen, np.concatenate([sky, land])) == pytest.approx(0.1)
-    assert fire_share(seen, np.concatenate([sky, 0.9 * flames])) == 0
+    assert fire_fraction(seen, np.concatenate([sky, land])) == pytest.approx(0.1)
+    assert fire_fraction(seen, np.concatenate([sky, 0.9 * flames])) == 0
 
 
 def test_smoke_is_continued_over_fire_and_stays_elsewhere(tmp_path) -> None:
