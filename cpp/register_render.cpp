@@ -221,7 +221,7 @@ void register_lights(py::module_ &module) {
         "medium"_a, "gradient"_a, "scratch"_a, "support"_a, "phase"_a, "lights"_a,
         R"(Add to the derivative by extinction what the in-scattered radiance says of it (adjoint sweep of `shade`).
 
-        ``scratch`` is one float a voxel, shape (nx+2, ny+2, nz+2, 1); a single light needs none. The derivative by the
+        ``scratch`` is one float per voxel, shape (nx+2, ny+2, nz+2, 1); a single light needs none. The derivative by the
         in-scattered radiance is used up.)");
 }
 

@@ -14,7 +14,7 @@ namespace {
 
 constexpr int taps = 3;   // a square's shadow is at most sqrt(2) pixels wide
 constexpr int chunk = 64; // voxels of a column at a time
-constexpr std::size_t columns_a_task = 4096;
+constexpr std::size_t columns_per_task = 4096;
 
 double ramp(double x) { return x > 0 ? x * x / 2 : 0; }
 
@@ -67,7 +67,7 @@ void project_turned(In volume, const Span *spans, const Turned &turned, float *p
         for (int j = 0; j < ny; ++j)
             if (const auto [first, end] = spans[std::size_t(i) * ny + j]; first < end)
                 filled.push_back({i, j, {}});
-    workers.run_ranges(filled.size(), columns_a_task, [&](std::size_t begin, std::size_t end) {
+    workers.run_ranges(filled.size(), columns_per_task, [&](std::size_t begin, std::size_t end) {
         for (std::size_t n = begin; n < end; ++n)
             filled[n].taps = taps_of(turned, filled[n].i, filled[n].j);
     });

@@ -17,7 +17,7 @@ using Stride = std::ptrdiff_t;
 // The two other axes of each axis.
 constexpr int LATERAL[3][2] = {{1, 2}, {0, 2}, {0, 1}};
 
-// `width` floats a voxel: extinction (1/m), then in-scattered radiance J by channel (or derivatives by
+// `width` floats per voxel: extinction (1/m), then in-scattered radiance J by channel (or derivatives by
 // these). Indices run from -1, the border, to n. Extinction is 0 in the border, J that of the nearest voxel.
 struct Voxels {
     float *data = nullptr;

@@ -43,7 +43,7 @@ class KnownScene:
     seen
         Returns what a camera saw in a frame, linear (rows, columns, 3).
     billboard
-        Returns the input picture of a frame as it is put into a view, on a screen in the middle of the box.
+        Returns the input picture of a frame as it is put into a view, on an upright plane in the middle of the box.
     truth
         Volumes and velocities, if they are known.
     """
@@ -101,7 +101,7 @@ def captured_scene(folder: Path, *, registered: bool = False) -> KnownScene:
         return area_average(picture, *REAL_SIZE)
 
     def billboard(view: str, frame: int) -> Image:
-        return picture_on_screen(seen("input", frame), cameras["input"], cameras[view], center)
+        return picture_on_plane(seen("input", frame), cameras["input"], cameras[view], center)
 
     name = f"{folder.name}, {'registered' if registered else 'as calibrated'}"
     frames = range(REAL_FRAMES[-1] + 1)
@@ -113,17 +113,17 @@ def moved(picture: Image, down: int, right: int) -> Image:
     return np.asarray(ndimage.shift(picture, (down, right, 0), order=0))
 
 
-def picture_on_screen(picture: Image, source: Camera, view: Camera, center: npt.NDArray[np.float64]) -> Image:
-    """Return a picture as another camera sees it on an upright screen that turns to face whoever looks.
+def picture_on_plane(picture: Image, source: Camera, view: Camera, center: npt.NDArray[np.float64]) -> Image:
+    """Return a picture as another camera sees it on an upright plane that turns to face whoever looks.
 
     Parameters
     ----------
     picture : (rows, columns, 3)
         What the source camera saw.
     source, view
-        The camera of the picture, and the one that looks at the screen.
+        The camera of the picture, and the one that looks at the plane.
     center : (3,)
-        The middle of the screen (m).
+        The middle of the plane (m).
     """
 
     def across(camera: Camera) -> npt.NDArray[np.float64]:

@@ -2,7 +2,7 @@
 
     python -m benchmarks.disturbances OUT SCENES/plume-3 SCENES/jet-3 ... [--only noise crf] [--methods default]
 
-OUT/stability.csv gets a row a disturbance, strength, scene and method; rows that are there stay as they are. Those that
+OUT/stability.csv gets a row per disturbance, strength, scene and method; rows that are there stay. Those that
 people meet come first. OUT gets stability_views.png, stability_velocity.png and stability.md, with the table.
 """
 

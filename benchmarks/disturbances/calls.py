@@ -30,8 +30,8 @@ def motion(known: Known, voxels: float, method: MethodName) -> Figures:
     after = advect(density, flow, 1 / known.fps)
     pair = DensityPair(density, after, 1 / known.fps, flow.voxel_size)
     found = compose(smooth(method)).velocity_estimator.estimate(pair)
-    counted = after > SMOKE_FRACTION * after.max()
-    return {"velocity_error": velocity_error(found.centres(), flow.centres(), counted)[0]}
+    compared = after > SMOKE_FRACTION * after.max()
+    return {"velocity_error": velocity_error(found.centres(), flow.centres(), compared)[0]}
 
 
 def scaled_density(known: Known, factor: float, method: MethodName) -> Figures:
@@ -46,8 +46,8 @@ def scaled_density(known: Known, factor: float, method: MethodName) -> Figures:
         smoothness, kinetic = (weight / factor**2 for weight in (estimator.smoothness, estimator.kinetic))
         estimator = replace(estimator, smoothness=smoothness, kinetic=kinetic)
     found = estimator.estimate(DensityPair(before, after, 1 / known.fps, known.domain.voxel_size))
-    counted = (after > SMOKE_FRACTION * after.max()) & ~known.inlets[FIRST + 1]
-    return {"velocity_error": velocity_error(found.centres(), known.velocities[FIRST + 1], counted)[0]}
+    compared = (after > SMOKE_FRACTION * after.max()) & ~known.inlets[FIRST + 1]
+    return {"velocity_error": velocity_error(found.centres(), known.velocities[FIRST + 1], compared)[0]}
 
 
 def wrong_start(known: Known, factor: float, method: MethodName) -> Figures:

@@ -24,7 +24,7 @@ _done: dict[tuple[object, ...], Figures] = {}
 def whole_run(take: Take, method: MethodName) -> Figures:
     """Reconstruct a take and return its figures; with a refusal the sentence alone.
 
-    Many disturbances have the same take where they disturb nothing: it is reconstructed once a process.
+    Many disturbances have the same take where they disturb nothing: it is reconstructed once per process.
 
     Returns
     -------
@@ -92,7 +92,7 @@ def flow_error(known: Known, moment: int, velocity: Array) -> float | None:
         At the centers of the small grid's voxels (m/s).
     """
     density, true = known.density(moment), known.velocities[moment]
-    counted = (density > SMOKE_FRACTION * density.max()) & ~known.inlets[moment]
-    if not counted.any() or not np.isfinite(true).all():
+    compared = (density > SMOKE_FRACTION * density.max()) & ~known.inlets[moment]
+    if not compared.any() or not np.isfinite(true).all():
         return None
-    return velocity_error(velocity, true, counted)[0]
+    return velocity_error(velocity, true, compared)[0]

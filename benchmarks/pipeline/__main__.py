@@ -30,7 +30,8 @@ MEMORY = 24.0
 """GiB of the largest machine that a grid is foretold for."""
 
 HEADER = (
-    "voxels", "may hold smoke", "density s", "velocity s", "s per frame", "solves", "MiB", "bytes a voxel", "front dB",
+    "voxels", "may hold smoke", "density s", "velocity s", "s per frame", "solves", "MiB", "bytes per voxel",
+    "front dB",
 )  # fmt: skip
 
 
@@ -93,7 +94,7 @@ def laws(runs: Sequence[Run]) -> list[str]:
     fractions = [run.occupied for run in done]
     return [
         f"Memory: {memory.base:.0f} MiB, {per_voxel:.0f} bytes per voxel, {bytes_more:.0f} more where smoke may be.",
-        f"Time: {time.base:.2f} s, {nanoseconds:.0f} ns a voxel, {more:.0f} more where smoke may be.",
+        f"Time: {time.base:.2f} s, {nanoseconds:.0f} ns per voxel, {more:.0f} more where smoke may be.",
         f"Time grows as voxels^{of_voxels:.2f} fraction^{of_fraction:.2f}.",
         *(
             f"{MEMORY:g} GiB hold {memory.most_voxels(1024 * MEMORY, occupied) / 1e6:.0f} million voxels of which "

@@ -54,7 +54,7 @@ def against_truth(pairs: Sequence[Pair], estimator: VelocityEstimator) -> tuple[
         velocity = estimator.estimate(DensityPair(pair.before, pair.after, 1.0, 1.0))
         seconds = time.perf_counter() - began
         solves = 2 * seconds / (before + machine.poisson_seconds((nx, ny, nz)))
-        found.append((volume_error(velocity.centres(), pair.motion, pair.counted), seconds, solves))
+        found.append((volume_error(velocity.centres(), pair.motion, pair.compared), seconds, solves))
     errors, times, counts = zip(*found, strict=True)
     return float(np.mean(errors)), float(np.median(times)), float(np.median(counts))
 
@@ -68,7 +68,7 @@ def measure(name: str, shape: tuple[int, int, int], truth: Truth | None) -> None
     else:
         frames = [round((truth.frames - 1) * (k + 1) / (count + 1)) for k in range(count)]
         pairs = [pair_of_truth(truth, frame) for frame in frames]
-    motion = float(np.mean([np.linalg.norm(pair.motion[pair.counted], axis=-1).mean() for pair in pairs]))
+    motion = float(np.mean([np.linalg.norm(pair.motion[pair.compared], axis=-1).mean() for pair in pairs]))
     print(f"\n{name}, {size_text(shape)}: {motion:.2g} voxels per frame on average\n")
     print(markdown(("estimate (* by default)", "error", "solves", "ms")), flush=True)
     for words, estimator in ESTIMATORS.items():

@@ -33,7 +33,7 @@ class Pair:
     inlet: Mask
 
     @property
-    def counted(self) -> Mask:
+    def compared(self) -> Mask:
         """The voxels that are compared: near smoke and away from the inlet."""
         return near_smoke(self.after) & away_from(self.inlet)
 

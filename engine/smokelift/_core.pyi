@@ -149,7 +149,7 @@ def shade_adjoint(
 ) -> None:
     """Add to the derivative by extinction what the in-scattered radiance says of it (adjoint sweep of `shade`).
 
-    ``scratch`` is one float a voxel, shape (nx+2, ny+2, nz+2, 1); a single light needs none. The derivative by the
+    ``scratch`` is one float per voxel, shape (nx+2, ny+2, nz+2, 1); a single light needs none. The derivative by the
     in-scattered radiance is used up.
     """
 

@@ -50,7 +50,7 @@ def test_the_default_is_what_a_user_gets_who_says_nothing(tmp_path) -> None:
 def test_no_label_lies_over_another_or_leaves_its_panel() -> None:
     pytest.importorskip("matplotlib")
     crowd = [f"{quality}:resolution={n}x{n}x{n}" for quality in ("draft", "balanced", "fine") for n in (32, 48, 64, 96)]
-    names = [*crowd, "balanced:resolution=auto", *(f"balanced:detail={share}" for share in (0, 0.25, 0.5, 0.75))]
+    names = [*crowd, "balanced:resolution=auto", *(f"balanced:detail={detail}" for detail in (0, 0.25, 0.5, 0.75))]
     error = dict.fromkeys(("view_error", "patches"), 0.07)
     runs = [
         Run(name, "8x8x96", 1 + 0.02 * index, {key: value + 1e-4 * index for key, value in error.items()})

@@ -7,7 +7,7 @@ import pytest
 
 from benchmarks.accuracy.ablations import EvenDepth, UnprojectedPrediction, WithoutHull, leave_out
 from benchmarks.accuracy.runs import run_method, run_settings, run_views
-from benchmarks.accuracy.scenes import picture_on_screen
+from benchmarks.accuracy.scenes import picture_on_plane
 from smokelift.density import DetailedDepth, NothingCarried, Observation, RoundDepth, ViewSet
 from smokelift.pipeline import compose
 from smokelift.render import Optics
@@ -62,4 +62,4 @@ def test_even_depth_does_not_change_along_the_rays():
 
 def test_a_picture_on_a_screen_is_unchanged_for_its_own_camera():
     picture = np.random.default_rng(0).random((16, 16, 3)).astype(np.float32)
-    np.testing.assert_array_equal(picture_on_screen(picture, CAMERA, CAMERA, np.zeros(3)), picture)
+    np.testing.assert_array_equal(picture_on_plane(picture, CAMERA, CAMERA, np.zeros(3)), picture)

@@ -30,9 +30,9 @@ def capture(tmp_path_factory) -> Path:
         domain=Domain((-1, -1, -1), (1, 1, 1), (8, 8, 8)),
     )
     scene.save(folder / "scene.toml")
-    aside = Camera.look_at((5, 0, 0), (0, 0, 0), fov_y_degrees=30, size=(WIDTH, HEIGHT))
-    replace(scene, camera=aside).save(folder / "camera00.toml")
-    replace(scene, camera=aside, clip=ClipSource(folder / "dim_####.png", fps=60.0)).save(folder / "camera05.toml")
+    turned = Camera.look_at((5, 0, 0), (0, 0, 0), fov_y_degrees=30, size=(WIDTH, HEIGHT))
+    replace(scene, camera=turned).save(folder / "camera00.toml")
+    replace(scene, camera=turned, clip=ClipSource(folder / "dim_####.png", fps=60.0)).save(folder / "camera05.toml")
     return folder
 
 

@@ -25,10 +25,10 @@ def test_smoke_at_rest_has_the_error_of_the_motion_that_it_has_not():
     assert against_truth([rest], CoarseToFine())[0] == pytest.approx(1, abs=0.01)
 
 
-def test_a_baked_pair_has_its_motion_in_voxels_a_frame():
+def test_a_baked_pair_has_its_motion_in_voxels_per_frame():
     smoke = built_in_pair(SHAPE, 0).before
     pair = pair_of_truth(truth(np.stack([smoke, np.roll(smoke, 1, axis=2)]), 0.1, speed=0.1 * 24), 0)
-    np.testing.assert_allclose(pair.motion[pair.counted].mean(0), (0, 0, 1), atol=1e-3)
+    np.testing.assert_allclose(pair.motion[pair.compared].mean(0), (0, 0, 1), atol=1e-3)
 
 
 @pytest.fixture(scope="module")
@@ -48,5 +48,5 @@ def test_the_velocity_has_no_divergence():
 def test_the_motion_carries_the_one_density_into_the_other(pair):
     origin = np.indices(FINE) - np.moveaxis(pair.motion, -1, 0)
     carried = ndimage.map_coordinates(pair.before, origin, order=3)
-    left, change = (np.linalg.norm((a - pair.after)[pair.counted]) for a in (carried, pair.before))
+    left, change = (np.linalg.norm((a - pair.after)[pair.compared]) for a in (carried, pair.before))
     assert left < 0.1 * change

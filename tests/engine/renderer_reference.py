@@ -162,8 +162,8 @@ def block_transport(extinction, edge, smoky):
     """
     blocks = extinction.shape
     transport = np.zeros((4, *blocks, 4, len(smoky)), extinction.dtype)
-    points, shares = np.polynomial.legendre.leggauss(40)
-    points, shares = (points + 1) / 2, shares / 2
+    points, weights = np.polynomial.legendre.leggauss(40)
+    points, weights = (points + 1) / 2, weights / 2
     bases = np.stack([np.ones(40), points - 0.5])
     for direction in np.ndindex(3, 3, 3):
         step = np.array(direction) - 1
@@ -174,10 +174,10 @@ def block_transport(extinction, edge, smoky):
         across = [axis for axis in range(3) if not step[axis]]
         for number, begin in enumerate(map(tuple, smoky)):
             t = extinction[begin] * length
-            leaving = length * (bases * shares) @ np.exp(-t * (1 - points))
+            leaving = length * (bases * weights) @ np.exp(-t * (1 - points))
             # within the block, from each point to those that lie farther
             farther = points[:, None] + (1 - points[:, None]) * points
-            reached = shares[:, None] * (1 - points[:, None]) * shares * np.exp(-t * (farther - points[:, None]))
+            reached = weights[:, None] * (1 - points[:, None]) * weights * np.exp(-t * (farther - points[:, None]))
             own = length * np.stack([bases @ reached.sum(1), bases @ (reached * (farther - 0.5)).sum(1)])
             _add_beam(transport, begin, number, weight, own, step)
             for axis in across:
@@ -186,7 +186,7 @@ def block_transport(extinction, edge, smoky):
             while np.all(at >= 0) and np.all(at < blocks):
                 to = tuple(at)
                 depth = extinction[to] * length
-                seen = (bases * shares) @ np.exp(-depth * points)
+                seen = (bases * weights) @ np.exp(-depth * points)
                 _add_beam(transport, to, number, weight, np.outer(seen, leaving), step)
                 for axis in across:
                     transport[(1 + axis, *to, 1 + axis, number)] += weight * seen[0] * leaving[0]

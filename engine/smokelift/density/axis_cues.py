@@ -265,8 +265,8 @@ def _under_ceiling(axis: SmokeAxis, pictures: Sequence[PlanePicture], camera: Ca
             shown.append([depth, width, max(1 - beyond / there, 0), there])
     if not shown:
         return axis
-    *known, amounts = np.array(shown).T
-    depth, width, ends = np.average(known, 1, amounts)
+    *known, weights = np.array(shown).T
+    depth, width, ends = np.average(known, 1, weights)
     weight = ends * np.exp(-((np.maximum(ceiling - heights, 0) / width) ** 2) / 2)[:, None]
     return replace(axis, depths=(1 - weight) * axis.depths + weight * depth)
 

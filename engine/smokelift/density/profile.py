@@ -52,7 +52,7 @@ ROOM = 0.3
 that is left of the profile there (docs/experiments/density-profile.md)."""
 
 SILHOUETTE = 0.05
-"""Fraction of the smoke's usual amount from which a pixel belongs to the silhouette
+"""Fraction of the smoke's usual optical depth from which a pixel belongs to the silhouette
 (docs/experiments/density-profile.md)."""
 
 THINNEST = 0.7
@@ -80,12 +80,12 @@ SMOOTHING = 1.5
 """Standard deviation (pixels) of the Gaussian that smooths the thickness (docs/experiments/density-profile.md)."""
 
 
-def smallest_spread(amount: Array, camera: Camera, domain: Domain) -> PlanePicture:
+def smallest_spread(optical_depth: Array, camera: Camera, domain: Domain) -> PlanePicture:
     """Standard deviation (m), on the upright plane, of the smoke along the line through each point where it is least.
 
-    ``amount`` (rows, columns) is the optical depth, or proportional to it.
+    ``optical_depth`` (rows, columns) may be in any unit.
     """
-    plane = on_upright_plane(amount, camera, domain, 1)
+    plane = on_upright_plane(optical_depth, camera, domain, 1)
     turns = np.pi / DIRECTIONS * np.arange(DIRECTIONS)
     least = np.min([_spread_along(plane, turn, domain.voxel_size) for turn in turns], axis=0)
     return PlanePicture(plane.heights, plane.laterals, least)
@@ -130,11 +130,11 @@ def inflated(mask: Mask) -> Doubles:
     return half
 
 
-def ball_spread(amount: Array, camera: Camera, domain: Domain) -> Array:
+def ball_spread(optical_depth: Array, camera: Camera, domain: Domain) -> Array:
     """Standard deviation (m) along the depth of the balls that fill the silhouette, at each pixel (rows, columns)."""
-    smoky = amount > 0
-    mask = amount > SILHOUETTE * (np.percentile(amount[smoky], 90) if smoky.any() else 1.0)
-    weight = amount + 1e-3 * amount.max(initial=1e-30)
+    smoky = optical_depth > 0
+    mask = optical_depth > SILHOUETTE * (np.percentile(optical_depth[smoky], 90) if smoky.any() else 1.0)
+    weight = optical_depth + 1e-3 * optical_depth.max(initial=1e-30)
     total = ndimage.gaussian_filter(weight * mask, SMOOTHING) + 1e-30
     half = ndimage.gaussian_filter(weight * inflated(mask), SMOOTHING) / total
     return np.asarray(_pixel_size(camera, domain) * half / np.sqrt(3), np.float32)
@@ -152,31 +152,31 @@ def _pixel_size(camera: Camera, domain: Domain) -> float:
 class DepthProfile:
     """The profile that a picture suggests.
 
-    ``amount`` (rows, columns) is the optical depth, or proportional to it. The rays' middles stand on the axis, or
-    scatter about it. With scatter the profile is narrower, so that the smoke is as deep as without.
+    ``optical_depth`` (rows, columns) may be in any unit. The rays' middles stand on the axis, or scatter about it. With
+    scatter the profile is narrower, so that the smoke is as deep as without.
     """
 
     def __init__(
-        self, amount: Array, camera: Camera, domain: Domain, axis: SmokeAxis, scatter: Scatter | None = None
+        self, optical_depth: Array, camera: Camera, domain: Domain, axis: SmokeAxis, scatter: Scatter | None = None
     ) -> None:
         self._domain, self._depth = domain, view_frame(camera)[1]
         self._rays = rays = PlaneRays.of(camera, domain)
-        middle = np.zeros(amount.shape)
+        middle = np.zeros(optical_depth.shape)
         for _ in range(STEPS_TO_AXIS):
             middle = axis.at(*rays.at(middle))
         at = rays.at(middle)
         if axis.several:
             across = axis.read(axis.widths, *at)
         else:
-            across = MIN_SPREAD_BIAS * smallest_spread(amount, camera, domain).read(*at)
+            across = MIN_SPREAD_BIAS * smallest_spread(optical_depth, camera, domain).read(*at)
         behind = LASTING_DISTANCE * axis.read(axis.spreads, *at)
-        spread = np.sqrt(across * ball_spread(amount, camera, domain) + behind**2)
+        spread = np.sqrt(across * ball_spread(optical_depth, camera, domain) + behind**2)
         deviation = np.maximum(spread, domain.voxel_size)  # in depth
-        narrowing, offset = 1.0, np.zeros(amount.shape)
+        narrowing, offset = 1.0, np.zeros(optical_depth.shape)
         if scatter is not None:
             # a lobe moves as one, so what is as deep as its surroundings on the mean tells how far
             blur = scatter.width / _pixel_size(camera, domain)
-            weight = amount + 1e-6 * amount.max(initial=1e-30)
+            weight = optical_depth + 1e-6 * optical_depth.max(initial=1e-30)
             deep = ndimage.gaussian_filter(weight * deviation, blur) / ndimage.gaussian_filter(weight, blur)
             narrowing, offset = float(np.sqrt(1 - scatter.deviation**2)), deep * scatter.offset
         width, middle = narrowing * SCALE * deviation, middle + offset

@@ -31,7 +31,7 @@ from smokelift.scene import Camera, Domain
 from smokelift.transport import block_means
 
 Picture = NDArray[np.float32]
-"""Optical depth (columns, voxels along the axis) on the screen of a turntable, or the like."""
+"""Optical depth (columns, voxels along the axis) on the upright plane of a turntable, or the like."""
 
 SIZE = 7
 """Pixels along a patch's side. With one scale for each factor of two, patches of neighboring scales overlap widely."""
@@ -108,7 +108,7 @@ class ClipTexture:
         # each frame is read once, the ones that follow for the motion alone
         needed = sorted({number + ahead for number in frames for ahead in (0, 1) if number + ahead < clip.length})
         seen = {number: _seen(clip, number) for number in needed}
-        upright = {number: _on_screens(views, domain) for number, views in seen.items()}
+        upright = {number: _upright_pictures(views, domain) for number, views in seen.items()}
         front = next((upright[number][0].turntable for number in frames if upright[number]), None)
         if front is None:
             return None
@@ -117,7 +117,7 @@ class ClipTexture:
         if abs(motion[0]) > abs(motion[1]):
             axis = int(np.argmax(np.abs(front.lateral)))
             motion = motion[::-1]
-        shown = [each for number in frames for each in _on_screens(seen[number], domain, axis)]
+        shown = [each for number in frames for each in _upright_pictures(seen[number], domain, axis)]
         pictures = [each.picture for each in shown]
         width = max(VOXEL, float(np.mean([_width(picture) for picture in pictures])))
         scales = [1]
@@ -135,7 +135,7 @@ class ClipTexture:
 
 
 class _Shown(NamedTuple):
-    """What a camera saw, on the screen of the turntable before it."""
+    """What a camera saw, on the upright plane of the turntable before it."""
 
     turntable: Turntable
     picture: Picture
@@ -147,15 +147,15 @@ def _seen(clip: ObservedClip, number: int) -> list[tuple[Camera, NDArray[np.floa
     return [(view.camera, view.optical_depth) for view in views]
 
 
-def _on_screens(
+def _upright_pictures(
     seen: Sequence[tuple[Camera, NDArray[np.float32]]], domain: Domain, axis: int | None = None
 ) -> list[_Shown]:
-    """Pictures that show smoke, on screens of an axis of the grid or of their own height."""
+    """Pictures that show smoke, on upright planes of an axis of the grid or of their own height."""
     found = []
     for camera, optical_depth in seen:
         if optical_depth.any():
             turntable = Turntable.facing(camera, domain, axis)
-            picture = turntable.screen(optical_depth, camera)
+            picture = turntable.on_plane(optical_depth, camera)
             if picture.any():
                 found.append(_Shown(turntable, picture))
     return found
@@ -179,8 +179,8 @@ def _motion(pairs: Sequence[tuple[Sequence[_Shown], Sequence[_Shown]]]) -> NDArr
 
 def _width(picture: Picture) -> float:
     """Standard deviation (columns) of a picture's smoke about the middle of its row."""
-    columns, amounts = np.arange(len(picture)), np.maximum(picture.sum(0), 1e-30)
-    middles = columns @ picture / amounts
+    columns, row_sums = np.arange(len(picture)), np.maximum(picture.sum(0), 1e-30)
+    middles = columns @ picture / row_sums
     return float(np.sqrt(np.sum(picture * (columns[:, None] - middles) ** 2) / picture.sum()))
 
 
@@ -201,12 +201,12 @@ def _energy(pictures: Sequence[Picture], blur: float) -> float:
     scale = 1
     while blur / (2 * scale) >= FINE_ENOUGH:
         scale *= 2
-    square = amount = 0.0
+    square = total = 0.0
     for picture in pictures:
         detail, coarse, body = _octave(block_means(picture, scale), blur / scale)
         square += float(np.sum(detail[body] ** 2 / coarse[body], dtype=np.float64))
-        amount += float(np.sum(coarse[body], dtype=np.float64))
-    return square / amount
+        total += float(np.sum(coarse[body], dtype=np.float64))
+    return square / total
 
 
 def fine_energy(pictures: Sequence[Picture]) -> float:
@@ -216,13 +216,13 @@ def fine_energy(pictures: Sequence[Picture]) -> float:
     more of those in the smoke the farther they are from the vertical (the ramp filter of backprojection: Kak and
     Slaney, "Principles of Computerized Tomographic Imaging", 1988, ch. 3). 0 for pictures without smoke.
     """
-    square = amount = 0.0
+    square = total = 0.0
     for picture in pictures:
         detail, coarse, body = _octave(picture, SMALLEST_BLUR)
         waves = scipy.fft.dct(detail * body / np.sqrt(np.where(body, coarse, 1)), axis=0, norm="ortho")
         square += float((np.square(waves).sum(1) * np.arange(len(waves)) / len(waves)).sum(dtype=np.float64))
-        amount += float(coarse[body].sum(dtype=np.float64))
-    return square / amount if amount > 0 else 0.0
+        total += float(coarse[body].sum(dtype=np.float64))
+    return square / total if total > 0 else 0.0
 
 
 def _octave(picture: Picture, blur: float) -> tuple[Picture, Picture, Mask]:
@@ -306,8 +306,8 @@ def _patches(v: Picture, height: float) -> tuple[NDArray[np.float32], NDArray[np
     linear, reach = np.expm1(v), SIZE // 2
     least = MIN_DEPTH * linear.max()
     at = np.array(np.nonzero(ndimage.maximum_filter(linear, SIZE) > least), np.int32)
-    amounts = linear.sum(0)
-    there = np.flatnonzero(amounts > MIN_DEPTH * amounts.max())
+    row_sums = linear.sum(0)
+    there = np.flatnonzero(row_sums > MIN_DEPTH * row_sums.max())
     place = height * (at[1] - there[0]) / max(there[-1] - there[0], 1)
     pixels = _core.unfold(np.pad(v, reach), at + reach, SIZE)
     return np.concatenate([pixels, place[None].astype(np.float32)]), at + reach

@@ -21,9 +21,9 @@ Picture = NDArray[np.float32]
 
 @dataclass(frozen=True, eq=False)
 class Turntable:
-    """A domain on a turntable before a camera, with a screen through its center.
+    """A domain on a turntable before a camera, with an upright plane through its center.
 
-    `lateral`, `depth` and `height` (3,) are the directions (unit, world) of the view that faces the screen. The domain
+    `lateral`, `depth` and `height` (3,) are the directions (unit, world) of the view that faces the plane. The domain
     turns about `height`, an axis of the grid through its center.
     """
 
@@ -38,7 +38,7 @@ class Turntable:
         _, depth, up = view_frame(camera)
         axis = int(np.argmax(np.abs(up))) if axis is None else axis
         height = np.zeros(3)
-        # of a lying axis the end to the right is the top, so that the screen is the picture on its side
+        # of a lying axis the end to the right is the top, so that the plane is the picture on its side
         along = up[axis] if abs(up[axis]) > 1e-6 else np.cross(depth, up)[axis]
         height[axis] = 1.0 if along >= 0 else -1.0
         depth = depth - (depth @ height) * height
@@ -52,7 +52,7 @@ class Turntable:
 
     @cached_property
     def shape(self) -> tuple[int, int]:
-        """Columns of the screen, which holds the domain however it is turned, and voxels along the axis."""
+        """Columns of the plane, which holds the domain however it is turned, and voxels along the axis."""
         corners = (self.domain.corners() - np.array(self.domain.centre)) / self.domain.voxel_size
         columns = np.max(np.hypot(corners @ self.lateral, corners @ self.depth))
         return int(np.ceil(2 * columns - 1e-6)), self.domain.resolution[self.axis]
@@ -74,8 +74,8 @@ class Turntable:
         back = np.array(camera.matrix)[:3, 2]
         return float(np.degrees(np.arctan2(back @ self.lateral, -(back @ self.depth))))
 
-    def screen(self, picture: Array, camera: Camera) -> Picture:
-        """Put a camera's picture (rows, columns) on the screen; zero where it shows nothing."""
+    def on_plane(self, picture: Array, camera: Camera) -> Picture:
+        """Put a camera's picture (rows, columns) on the plane; zero where it shows nothing."""
         columns, voxels = self.shape
         h = self.domain.voxel_size
         side = (np.arange(columns) + 0.5 - columns / 2) * h

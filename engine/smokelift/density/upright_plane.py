@@ -122,7 +122,7 @@ def read_linearly(
     return np.asarray(ndimage.map_coordinates(values, np.broadcast_arrays(*at), order=1, mode="nearest"))
 
 
-def on_upright_plane(amount: Array, camera: Camera, domain: Domain, per_voxel: int) -> PlanePicture:
+def on_upright_plane(optical_depth: Array, camera: Camera, domain: Domain, per_voxel: int) -> PlanePicture:
     """Put a picture (rows, columns) on the upright plane, ``per_voxel`` rows to a voxel and one column."""
     lateral, depth, height = view_frame(camera)
     center = np.array(domain.centre)
@@ -133,7 +133,7 @@ def on_upright_plane(amount: Array, camera: Camera, domain: Domain, per_voxel: i
     ends = reach_along(domain, height) + reach_along(domain, depth) / 2
     up = np.arange(-ends + h / (2 * per_voxel), ends, h / per_voxel)
     points = center + across[None, :, None] * lateral + up[:, None, None] * height
-    return PlanePicture(up, across, seen_at(points, amount, camera))
+    return PlanePicture(up, across, seen_at(points, optical_depth, camera))
 
 
 def seen_at(points: Doubles, picture: Array, camera: Camera) -> Doubles:

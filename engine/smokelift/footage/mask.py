@@ -32,7 +32,7 @@ MIN_WEIGHT = 0.01
 """Weight of what is seen below which a pixel is continued from all of the picture, not from around it: at this weight
 single precision still has five digits."""
 
-KEPT_MASKS = 16
+MAX_CACHED_MASKS = 16
 """Resized masks that are kept: two megabytes each at 1080p."""
 
 Seen = npt.NDArray[np.bool_]
@@ -76,7 +76,7 @@ class Mask:
         def picture(n: int) -> Picture:
             return video.read(n).linear() if video else read_image(files[n], "linear")
 
-        @lru_cache(maxsize=KEPT_MASKS)
+        @lru_cache(maxsize=MAX_CACHED_MASKS)
         def resized(n: int, width: int, height: int) -> Seen:
             return area_average(picture(n) @ LUMINANCE.astype(np.float32), width, height) >= 0.5
 

@@ -12,9 +12,9 @@ from scipy import ndimage
 
 from smokelift.footage.frame_source import StoredPicture
 from smokelift.footage.images import Picture
-from smokelift.footage.mask import KEPT_MASKS, Mask, Seen
+from smokelift.footage.mask import MAX_CACHED_MASKS, Mask, Seen
 
-KEPT_FRAMES = 2
+MAX_CACHED_FRAMES = 2
 """Registered frames that are kept: several parts of the program read one after another."""
 
 Read = Callable[[int], StoredPicture]
@@ -114,7 +114,7 @@ class RegisteredPicture(StoredPicture):
 def registered(read: Read, motion: Callable[[int], Similarity]) -> Read:
     """Return what reads the frames of a file registered by their motion."""
 
-    @lru_cache(maxsize=KEPT_FRAMES)
+    @lru_cache(maxsize=MAX_CACHED_FRAMES)
     def whole(number: int) -> Picture:
         picture = motion(number).registered(read(number).linear())
         picture.flags.writeable = False
@@ -133,7 +133,7 @@ def registered_mask(mask: Mask | None, motion: Callable[[int], Similarity]) -> M
     ``mask`` is that of the frames as they were filmed, if there is one.
     """
 
-    @lru_cache(maxsize=KEPT_MASKS)
+    @lru_cache(maxsize=MAX_CACHED_MASKS)
     def seen(n: int, width: int, height: int) -> Seen:
         return motion(n).nearest(np.ones((height, width), np.bool_) if mask is None else mask.seen(n, width, height))
 

@@ -236,12 +236,12 @@ def _placed(values: Array, box: Domain, whole: Domain) -> Array:
     """The values of a box's voxels, or of its faces, in another domain; zero where the box has none."""
     if box == whole:
         return values
-    missing, kept = [], []
+    missing, inside = [], []
     for start, count, own, room in zip(box.first_in(whole), values.shape, box.shape, whole.shape, strict=True):
         wanted = room + count - own  # one more along the axis of faces
         missing.append((max(start, 0), max(wanted - start - count, 0)))
-        kept.append(slice(max(-start, 0), max(-start, 0) + wanted))
-    return np.ascontiguousarray(np.pad(values, missing)[tuple(kept)], np.float32)
+        inside.append(slice(max(-start, 0), max(-start, 0) + wanted))
+    return np.ascontiguousarray(np.pad(values, missing)[tuple(inside)], np.float32)
 
 
 class Viewer:

@@ -123,8 +123,8 @@ class CarriedState:
     def stored(self) -> ResumeState:
         """What a run that is resumed after the frame reads."""
         volumes = {"smooth": self.smooth_density, "steady": self.for_advection}
-        kept = {name: volume for name, volume in volumes.items() if volume is not None}
-        return ResumeState(self.number, self.density, self.velocity.faces, kept)
+        present = {name: volume for name, volume in volumes.items() if volume is not None}
+        return ResumeState(self.number, self.density, self.velocity.faces, present)
 
     @staticmethod
     def read(state: ResumeState, shot: Shot) -> "CarriedState":
@@ -272,10 +272,10 @@ def _density(
     fitted = method.density_fit.fit(views, priors.pop(), starts.pop())
     if unseen is not None:
         visible = project_voxels(views.views[0].camera, shot.optics.domain).visible
-        density, kept = np.where(visible, fitted.density, unseen[0]), fitted.smooth_density
-        if kept is not None:
-            kept = np.where(visible, kept, unseen[1])
-        fitted = replace(fitted, density=density, smooth_density=kept, for_advection=None)
+        density, smooth = np.where(visible, fitted.density, unseen[0]), fitted.smooth_density
+        if smooth is not None:
+            smooth = np.where(visible, smooth, unseen[1])
+        fitted = replace(fitted, density=density, smooth_density=smooth, for_advection=None)
     return fitted, figures
 
 

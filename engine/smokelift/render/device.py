@@ -22,7 +22,7 @@ DeviceName = Literal["auto", "cpu", "gpu"]
 _DRIVERS = {"linux": ("libcuda.so.1", "libvulkan.so.1"), "win32": ("nvcuda.dll", "vulkan-1.dll")}
 """Libraries of which one is there where Taichi can use a GPU; macOS always has Metal."""
 
-_running: str | None = None  # one device a process
+_running: str | None = None  # one device per process
 
 NO_TAICHI = (
     "Taichi is not installed: install it (pip install 'smokelift[gpu]'; in Blender the extension's zip smokelift_gpu)"

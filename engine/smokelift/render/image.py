@@ -111,7 +111,7 @@ def render_gradient(
         return _of_view(density, _renderer(scene, camera), target)
     require_kind(camera, Sequence, "camera", "a Camera, or a list of them")
     if len(camera) != len(target) or not camera:
-        raise ValueError(f"There must be one target a camera, not {len(target)} for {len(camera)}.")
+        raise ValueError(f"There must be one target per camera, not {len(target)} for {len(camera)}.")
     views = [_of_view(density, _renderer(scene, view), goal) for view, goal in zip(camera, target, strict=True)]
     losses, gradients, images = zip(*views, strict=True)
     return sum(losses), sum(gradients[1:], gradients[0]), list(images)

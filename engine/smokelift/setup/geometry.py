@@ -135,17 +135,19 @@ def find_geometry(scene: Scene, estimate: FirstEstimate, settings: Settings) -> 
         (floor, size), multiple = _box_around_smoke(camera, samples, meters), 4
     else:
         floor, size, multiple = np.array([*box.centre[:2], box.min[2]]), np.array(box.size), 1
-    still = camera.at(next(iter(samples.smoky), 0))
+    first_camera = camera.at(next(iter(samples.smoky), 0))
 
     def grids(quality: Quality) -> tuple[Domain, ...]:
         limit = LIMITS[quality]
         if isinstance(box, Domain):
-            least, most = min(MIN_SIDE_VOXELS, max(box.resolution)), limit.voxels(_pixels_along(still, box))
+            least, most = min(MIN_SIDE_VOXELS, max(box.resolution)), limit.voxels(_pixels_along(first_camera, box))
             allowed = proportional(box.resolution, least, most)
             allowed = allowed or proportional(box.resolution, least, max(box.resolution))[:1]
             return tuple(replace(box, resolution=each) for each in allowed)
         pixels = (
-            max(size) / meters if box is None else _pixels_along(still, _box_grids(floor, size, MIN_SIDE_VOXELS, 1)[0])
+            max(size) / meters
+            if box is None
+            else _pixels_along(first_camera, _box_grids(floor, size, MIN_SIDE_VOXELS, 1)[0])
         )
         return _box_grids(floor, size, limit.voxels(pixels), multiple)
 
@@ -329,10 +331,10 @@ def smoke_detail(frames: Iterable[tuple[Image, Plate]], pixels: float) -> Detail
     energy = np.zeros(RINGS)
     for picture, plate in frames:
         change = (linear_to_srgb(picture) - linear_to_srgb(plate.image)).mean(-1, dtype=np.float64)
-        noise, still = float(plate.noise.total.mean()), ~matte(picture, plate).mask
+        noise, clear = float(plate.noise.total.mean()), ~matte(picture, plate).mask
         # the channels' mean has less noise; the median stays with pixels that have no thin smoke below the mask
-        if still.any():
-            noise = min(noise, NORMAL_MEDIAN * float(np.median(np.abs(change[still]))))
+        if clear.any():
+            noise = min(noise, NORMAL_MEDIAN * float(np.median(np.abs(change[clear]))))
         energy += _beyond_noise(change, noise)
     return DetailSpectrum(energy, pixels)
 

@@ -245,10 +245,10 @@ def first_light(
         )
     richest = scattering or ("absorption" if medium.albedo == 0 else "single" if lights else "unshadowed")
     if lights or richest == "absorption":
-        still, whole = geometry.camera.at(0), list(lights)
+        camera, whole = geometry.camera.at(0), list(lights)
         for number, each in enumerate(lights):
             if isinstance(each, EnvironmentLight) and each.directions is None:
-                count = environment_count(each, still, geometry.domain, medium)
+                count = environment_count(each, camera, geometry.domain, medium)
                 whole[number] = replace(each, directions=count)
         return tuple(whole), richest, []
     found, about = estimate.source, "source radiance"

@@ -46,7 +46,7 @@ class ShotView:
         if self.camera.moves:
             plate = self.plate.at(frame).through(working.cut, working.pixels)
         else:
-            plate = self._still_plate.at(frame)
+            plate = self._plate_of_working_picture.at(frame)
         image = working.of(self.clip, frame)
         return Observation(working.camera, image, plate, self.element(frame, working))
 
@@ -63,7 +63,7 @@ class ShotView:
         return working_picture(self.camera.at(frame), domain) if self.camera.moves else self.working
 
     @cached_property
-    def _still_plate(self) -> Plate:
+    def _plate_of_working_picture(self) -> Plate:
         """The plate of a still camera's small picture."""
         return self.plate.through(self.working.cut, self.working.pixels)
 
@@ -112,7 +112,7 @@ class Shot:
 
     @cached_property
     def found_background(self) -> Image | None:
-        """Picture (rows, columns, 3) behind the smoke; None where the scene has it, or one a frame, or one color."""
+        """Picture (rows, columns, 3) behind the smoke; None where the scene has it, or one per frame, or one color."""
         plate, background = self.views[0].plate, self.scene.background
         painted = background.strokes is not None
         if plate.images is not None or (background.image is not None and not painted):

@@ -1,7 +1,7 @@
 """The velocity that carries one density into the next.
 
 Two densities show how fast smoke moves along their gradient. The rest follows from a flow that is smooth and has no
-divergence. The estimate minimizes
+divergence. The estimate minimizes (equations 11 to 13 of Cen et al., generalized)
 
     sum W (r + g . (u - u_k))^2 + R(u - u_p) + irrotational * sum outside the smoke of |curl u|^2
 
@@ -17,7 +17,7 @@ subject to div u = 0, over velocities u on voxel faces, in voxels per frame, wit
 on one grid after a prediction, which is coarse in a reconstruction; else from a coarse grid to the one that is asked
 for (`coarse_to_fine`). It is linearized anew after the first solve (`linearization`). Before and after are as
 `prepare` makes them. Division by s makes every weight independent of the scales of density, space and time. k is
-`UNEXPLAINED` over the fraction of the change that u_p leaves unexplained: it grows as u_p gets better.
+`UNEXPLAINED_FRACTION` over the fraction of the change that u_p leaves unexplained: it grows as u_p gets better.
 
 Sources: Cen, Zhang, Liang (2023), Entropy 25, 1348, section 3.3; Eckert et al. (2019), ACM TOG 38(6), 239 (ScalarFlow).
 """

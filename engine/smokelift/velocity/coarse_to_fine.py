@@ -32,11 +32,11 @@ KINETIC = 0.003
 """Weight of what departs from the center. It only holds what nothing else does
 (docs/experiments/velocity-solver.md)."""
 
-UNEXPLAINED, MIN_UNEXPLAINED = 0.25, 0.04
+UNEXPLAINED_FRACTION, MIN_UNEXPLAINED_FRACTION = 0.25, 0.04
 """Fraction of the change, left unexplained by the center, at which the weights apply unscaled: they grow in inverse
 proportion to that fraction, down to the second one (docs/experiments/velocity-solver.md)."""
 
-MAX_UNEXPLAINED = 0.5
+MAX_UNEXPLAINED_FRACTION = 0.5
 """Fraction of the change left unexplained from which a prediction is not used: after a cut, say, or a gust
 (docs/experiments/velocity-solver.md)."""
 
@@ -132,8 +132,8 @@ def _found(pair: DensityPair, given: Velocity | None, settings: VelocitySettings
             return None
         center, trust, dissipation = fit_center(prediction, prepared.after, linear, u)
         linear = linear.with_dissipation(dissipation)
-        unexplained, _ = linear.unexplained(center, prepared.noise)
-        scale = UNEXPLAINED / max(unexplained, MIN_UNEXPLAINED)
+        fraction, _ = linear.unexplained_fraction(center, prepared.noise)
+        scale = UNEXPLAINED_FRACTION / max(fraction, MIN_UNEXPLAINED_FRACTION)
         smoothness, kinetic = scale * settings.smoothness, scale * KINETIC
         problem = least_squares(linear, center, second_order=smoothness, kinetic=kinetic, irrotational=IRROTATIONAL)
         start = u if any(component.any() for component in u.faces) else center
@@ -141,7 +141,7 @@ def _found(pair: DensityPair, given: Velocity | None, settings: VelocitySettings
         solution, solved = settings.solver.solve(problem, start)
         effort.update({name: solved[name] for name in ("iterations", "products", "projections")})
         u = _clamped(solution, u)
-    found = {"residual": solved["residual"], "unexplained": unexplained, "trust": trust}
+    found = {"residual": solved["residual"], "unexplained": fraction, "trust": trust}
     return in_meters(u, pair, {**effort, **found, "dissipation": prepared.density_dissipation(dissipation)})
 
 
@@ -162,10 +162,10 @@ def _usable_prediction(
     linear = linearize(prepared.before, prepared.after, weight, u)
     if linear is None:
         return None
-    unexplained, rest = linear.unexplained(u, prepared.noise)
+    fraction, rest = linear.unexplained_fraction(u, prepared.noise)
     # The linearized change grows with the prediction, however wrong that is, so that long runs would run away.
     change = (prepared.after - prepared.before) / np.float32(linear.scale)
-    usable = unexplained < MAX_UNEXPLAINED and rest < float(np.sum(linear.weight * change**2, dtype=np.float64))
+    usable = fraction < MAX_UNEXPLAINED_FRACTION and rest < float(np.sum(linear.weight * change**2, dtype=np.float64))
     return u if usable else None
 
 

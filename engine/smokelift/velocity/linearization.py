@@ -149,7 +149,7 @@ class Linearization:
         """The change that is left where a fraction of the smoke dissolves."""
         return replace(self, offset=self.offset + np.float32(fraction) * self.carried) if fraction else self
 
-    def unexplained(self, u: StaggeredGrid, noise: float) -> tuple[float, float]:
+    def unexplained_fraction(self, u: StaggeredGrid, noise: float) -> tuple[float, float]:
         """Fraction of the squared change that a velocity leaves beyond noise of a variance, and all that it leaves."""
         left = self.offset + directional_derivative(self.direction, u.faces)
         whole, rest = (float(np.sum(self.weight * change**2, dtype=np.float64)) for change in (self.offset, left))

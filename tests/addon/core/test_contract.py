@@ -1,4 +1,4 @@
-"""What the engine and the add-on have in common, from names to scene files and the pace that is tried out."""
+"""What the engine and the add-on have in common, from names to scene files and the retiming that is tried out."""
 
 import math
 import tomllib
@@ -143,14 +143,14 @@ LONGEST_EXPRESSION = 256
 @pytest.mark.parametrize("speeds", [(1.0,), (0.25,), (3.0,), (1.0, 0.2, 1.0), (0.5, 0.5, 2.0), (2.0, 1.0)])
 def test_places_and_speeds_are_the_engines(speeds) -> None:
     count = 41
-    pace = retiming(count, speeds, "t")
+    retimed = retiming(count, speeds, "t")
     places, wanted = playback(count, speeds)
     for time, (place, speed) in enumerate(zip(places, wanted, strict=True)):
-        found = [eval(text, {"t": time, "exp": math.exp}) for text in (pace.place, pace.speed)]
+        found = [eval(text, {"t": time, "exp": math.exp}) for text in (retimed.place, retimed.speed)]
         np.testing.assert_allclose(found, (place, speed), rtol=2e-3, atol=2e-3)
-    assert len(places) - 1 <= pace.duration <= len(places) + 1 / speeds[-1]
+    assert len(places) - 1 <= retimed.duration <= len(places) + 1 / speeds[-1]
 
 
 def test_an_expression_is_short_enough_for_blender() -> None:
-    pace = retiming(1234, (0.123456789, 1.23456789, 0.987654321), "(frame-1234+0.001)/1.23456789")
-    assert len(f"floor(min({pace.place},1233))-(frame-1234)+1234") < LONGEST_EXPRESSION
+    retimed = retiming(1234, (0.123456789, 1.23456789, 0.987654321), "(frame-1234+0.001)/1.23456789")
+    assert len(f"floor(min({retimed.place},1233))-(frame-1234)+1234") < LONGEST_EXPRESSION

@@ -11,10 +11,10 @@ from smokelift.app.progress import JsonReporter, Reporter
 from smokelift.checks import Finding
 
 
-def figures(seconds: float, hull_share: float = 0.1, psnr: float = 41.23) -> dict[str, Any]:
+def figures(seconds: float, smoky: float = 0.1, psnr: float = 41.23) -> dict[str, Any]:
     return {
-        **({"psnr": psnr} if hull_share > 0 else {}),
-        "hull_share": hull_share,
+        **({"psnr": psnr} if smoky > 0 else {}),
+        "hull_share": smoky,
         "seconds_density": seconds / 2,
         "seconds_velocity": seconds / 2,
         "velocity": {"iterations": 3},
@@ -72,7 +72,7 @@ def test_text_names_what_matters(capsys) -> None:
         say.finish("3 frames in out.", {})
     with Reporter() as say:
         say.start(1, 0)
-        say.frame(1, figures(1.0, hull_share=0.0))
+        say.frame(1, figures(1.0, smoky=0.0))
     out = capsys.readouterr().out
     for words in ("Light [not] given: /a/[bold]path", "3/3", "no smoke", "fit 30.0 dB", "3 frames in out."):
         assert words in out

@@ -60,10 +60,10 @@ def main(words):
         there[str(number)] = {"psnr": 30.0, "seconds_density": task["seconds"], "seconds_velocity": 0.0}
         written = {"format": 1, "scene": {}, "settings": {}, "choices": [], "provenance": [], "frames": there}
         written |= {"sources": {}, "checksums": {}, "versions": {}}
-        aside = out / ".aside.tmp"
-        aside.write_text(json.dumps({**written, "complete": number == task["frames"]}))
+        temporary = out / ".aside.tmp"
+        temporary.write_text(json.dumps({**written, "complete": number == task["frames"]}))
         with COMMITTING, (out.parent / f"{out.name}.ledger").open("a") as ledger:
-            aside.replace(index)
+            temporary.replace(index)
             ledger.write(f"{number}\n")
             ledger.flush()
     return say("done", text="Finished.")

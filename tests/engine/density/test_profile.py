@@ -93,8 +93,8 @@ def test_no_plate_sticks_out_from_the_base_of_a_column() -> None:
     base, _ = project_points(LEVEL, np.array([0.0, -0.3, 0.0]))
     amount[int(base[1]) :] = 0
     density = Profile.of(amount, LEVEL, SmokeAxis.upright()).density[16]
-    amounts, squares = density.sum(0), DEPTHS**2 @ density
-    depths = np.sqrt(squares / np.maximum(amounts, 1e-9) - (DEPTHS @ density / np.maximum(amounts, 1e-9)) ** 2)
+    row_sums, squares = density.sum(0), DEPTHS**2 @ density
+    depths = np.sqrt(squares / np.maximum(row_sums, 1e-9) - (DEPTHS @ density / np.maximum(row_sums, 1e-9)) ** 2)
     assert depths[1:4].max() < 1.1 * depths[24]
 
 

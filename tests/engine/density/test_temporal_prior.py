@@ -110,5 +110,5 @@ def test_a_layer_that_entered_is_filled_though_it_is_thinner_than_a_lobe(detaile
     gap = np.ones(detailed.true.shape, np.float32)
     gap[:, :, 10:12] = 0
     starts = [detailed.start(factor * detailed.prior, factor * detailed.prior).density for factor in (gap, gap**0)]
-    amounts = [start.sum((0, 1)) for start in starts]
-    np.testing.assert_allclose(*amounts, rtol=0.05, atol=0.01 * amounts[1].max())
+    row_sums = [start.sum((0, 1)) for start in starts]
+    np.testing.assert_allclose(*row_sums, rtol=0.05, atol=0.01 * row_sums[1].max())

@@ -1,4 +1,4 @@
-"""The turntable: its cameras see the domain turned, and its screen shows a camera's picture."""
+"""The turntable: its cameras see the domain turned, and its plane shows a camera's picture."""
 
 import numpy as np
 import pytest
@@ -30,16 +30,16 @@ def test_the_domain_fits_into_every_picture_at_a_pixel_a_voxel(degrees) -> None:
 
 
 def test_the_screen_shows_what_stands_on_it_where_it_stands() -> None:
-    """A point of the screen in the camera's picture comes back to the pixel of the turntable's own front camera."""
+    """A point of the plane in the camera's picture comes back to the pixel of the turntable's own front camera."""
     turntable = Turntable.facing(CAMERA, DOMAIN)
     point = np.array(DOMAIN.centre) + 0.25 * turntable.lateral + 0.35 * turntable.height
     picture = np.zeros(CAMERA.size[::-1], np.float32)
     (x, y), _ = project_points(CAMERA, point)
     picture[int(y), int(x)] = 1
-    screen = turntable.screen(picture, CAMERA)
+    plane = turntable.on_plane(picture, CAMERA)
     (column, row), _ = project_points(turntable.camera(0), point)
-    found = np.array(np.unravel_index(screen.argmax(), screen.shape))
-    np.testing.assert_allclose(found + 0.5, (column, screen.shape[1] - row), atol=1.1)
+    found = np.array(np.unravel_index(plane.argmax(), plane.shape))
+    np.testing.assert_allclose(found + 0.5, (column, plane.shape[1] - row), atol=1.1)
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])

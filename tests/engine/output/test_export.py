@@ -66,9 +66,9 @@ def test_quantized_shows_in_no_picture_of_8_bits(sequence, tmp_path) -> None:
     for axis in range(3):
         seen, wanted = (np.exp(-EXTINCTION * DOMAIN.voxel_size * r.sum(axis)) for r in (rho, true))
         assert np.abs(seen - wanted).max() < 1 / 255
-    voxels_a_frame = DOMAIN.voxel_size * 24
+    voxels_per_frame = DOMAIN.voxel_size * 24
     near = rho > 0
-    assert np.abs(u - sequence.velocity_at_centres(1))[near].max() <= voxels_a_frame / 32
+    assert np.abs(u - sequence.velocity_at_centres(1))[near].max() <= voxels_per_frame / 32
 
 
 @needs_vdb

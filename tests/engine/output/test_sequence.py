@@ -148,8 +148,8 @@ def test_a_moving_camera_is_followed(plume, tracked, tmp_path) -> None:
         density, camera = plume.densities[number - 1], tracked.camera.at(number - 1)
         before = replace(tracked, background=Background(color=[0.1 * (number - 1)] * 3))
         np.testing.assert_allclose(front.image(number, density), render(density, before, camera), atol=1e-3)
-        aside = orbit(camera, scene.domain, 30)
-        np.testing.assert_allclose(turned.image(number, density), render(density, tracked, aside), atol=1e-3)
+        beside = orbit(camera, scene.domain, 30)
+        np.testing.assert_allclose(turned.image(number, density), render(density, tracked, beside), atol=1e-3)
 
 
 def test_a_flame_adds_its_light(plume) -> None:

@@ -57,7 +57,7 @@ def test_losses_of_several_views_add_up(density, target):
     np.testing.assert_array_equal(gradient, one[1] + two[1])
     for found, expected in zip(images, (one[2], two[2]), strict=True):
         np.testing.assert_array_equal(found, expected)
-    with pytest.raises(ValueError, match="one target a camera"):
+    with pytest.raises(ValueError, match="one target per camera"):
         render_gradient(density, SCENE, [target], [SCENE.camera, ASIDE])
 
 

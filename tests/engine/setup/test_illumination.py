@@ -295,9 +295,9 @@ def test_the_source_is_beyond_the_thickest_smoke():
     """Thin smoke before a background that is brighter in the one channel in which smoke is darker."""
     source = np.array((0.4, 0.3, 0.0))
     seen = samples(source, GREEN, 0.5)
-    amounts = (seen.colors - GREEN) @ (source - GREEN)
+    along = (seen.colors - GREEN) @ (source - GREEN)
     found = source_radiance(seen)
-    assert (found - GREEN) @ (source - GREEN) > amounts.max()
+    assert (found - GREEN) @ (source - GREEN) > along.max()
 
 
 def test_a_known_light_leaves_the_smoke_the_rest():

@@ -54,18 +54,18 @@ def uniform(motion, shape=SHAPE):
     return Velocity([np.full(n, v * VOXEL / DT) for n, v in zip(face_shapes(shape), motion, strict=True)], VOXEL)
 
 
-def voxels_a_frame(velocity):
+def voxels_per_frame(velocity):
     """At voxel centers."""
     return velocity.centres() * (DT / VOXEL)
 
 
 def mean_motion(velocity, density):
     """Voxels a frame of the smoke as a whole."""
-    return np.average(voxels_a_frame(velocity).reshape(-1, 3), axis=0, weights=density.ravel())
+    return np.average(voxels_per_frame(velocity).reshape(-1, 3), axis=0, weights=density.ravel())
 
 
 def error_in_smoke(velocity, density, displacement):
     """Relative, inside the smoke."""
     inside = density > 0.1 * density.max()
     wanted = np.broadcast_to(displacement, (*density.shape, 3))[inside]
-    return np.linalg.norm(voxels_a_frame(velocity)[inside] - wanted) / np.linalg.norm(wanted)
+    return np.linalg.norm(voxels_per_frame(velocity)[inside] - wanted) / np.linalg.norm(wanted)

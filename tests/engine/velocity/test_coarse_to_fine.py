@@ -25,7 +25,7 @@ from tests.engine.velocity.known_motions import (
     structured_density,
     translation,
     uniform,
-    voxels_a_frame,
+    voxels_per_frame,
 )
 
 DEFAULT, PAPER = CoarseToFine(), PaperVelocity()
@@ -200,7 +200,7 @@ def test_speeds_from_a_tenth_of_a_voxel_to_ten(speed):
     before, after, truth = translation(motion, (48, 48, 56), radius=9.0)
     found = estimate_velocity(before, after, DT, VOXEL)
     assert error_in_smoke(found, after, truth) < 0.55
-    speeds = np.linalg.norm(voxels_a_frame(found), axis=-1)
+    speeds = np.linalg.norm(voxels_per_frame(found), axis=-1)
     assert 0.7 < speeds[after > 0.1 * after.max()].mean() / speed < 1.3
     assert speeds.max() < 3 * speed
 
@@ -214,7 +214,7 @@ def test_a_chain_of_frames_settles():
         prediction = predict_velocity(found, DT)
         errors.append(error_in_smoke(found, after, truth))
         largest = np.linalg.norm(truth[after > 0.1 * after.max()], axis=-1).max()
-        speeds.append(np.linalg.norm(voxels_a_frame(found), axis=-1).max() / largest)
+        speeds.append(np.linalg.norm(voxels_per_frame(found), axis=-1).max() / largest)
     assert max(errors[3:]) < 0.85 * errors[0] < 0.65
     assert min(speeds[4:]) > 0.7 and max(speeds[4:]) < 1.6
 
@@ -231,7 +231,7 @@ def test_the_velocity_is_found_in_a_box_of_walls():
 def test_smoke_that_is_gone_has_no_velocity(prediction):
     before, _, _ = translation((0.3, 0.2, 0.5))
     gone = estimate_velocity(before, np.zeros(SHAPE), DT, VOXEL, prediction=prediction)
-    assert np.abs(voxels_a_frame(gone)).max() < 0.2
+    assert np.abs(voxels_per_frame(gone)).max() < 0.2
     never = estimate_velocity(np.zeros(SHAPE), np.zeros(SHAPE), DT, VOXEL, prediction=prediction)
     assert not never.centres().any()
 
@@ -243,7 +243,7 @@ def test_smoke_that_is_gone_has_no_velocity(prediction):
 def test_smoke_that_appears_flickers_or_dissolves_does_not_move(before, after, most):
     density = translation((0, 0, 0))[0].astype(np.float32)
     found = estimate_velocity(before * density, after * density, DT, VOXEL)
-    assert np.abs(voxels_a_frame(found)).max() <= most
+    assert np.abs(voxels_per_frame(found)).max() <= most
     if after < 1:
         assert found.figures["dissipation"] == pytest.approx(1 - after, abs=0.01)
 

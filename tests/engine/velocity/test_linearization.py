@@ -19,7 +19,7 @@ def test_what_a_shift_explains_is_linear_in_it(shape):
     upwards = rest.with_faces([rest.faces[0], rest.faces[1], rest.faces[2] + np.float32(0.5)])
     along = directional_derivative(linear.direction, upwards.faces)
     np.testing.assert_allclose(along * linear.scale, 1, rtol=1e-5)
-    assert linear.unexplained(upwards, 0.0)[0] < 1e-10
+    assert linear.unexplained_fraction(upwards, 0.0)[0] < 1e-10
     assert linear.with_dissipation(0.1).offset.shape == shape
 
 

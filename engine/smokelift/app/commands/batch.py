@@ -68,7 +68,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         type=whole_number(1, MAX_WORKERS),
         default=os.cpu_count() or 1,
         metavar="N",
-        help="run N shots at a time at most (default: one a processor core)",
+        help="run N shots at a time at most (default: one per processor core)",
     )
     parser.add_argument(
         "--scheduler", metavar="ADDRESS", help="run on a Dask cluster, as tcp://host:8786 (needs the extra [cluster])"
