@@ -72,8 +72,19 @@ LEANING = 0.2
 """Fraction of the box's variance that stays of a column whose base is known: it may lean
 (docs/experiments/density-axis.md)."""
 
-SPECK = 0.05
-"""Fraction of the largest row from which a row shows smoke, not specks; as for the floor's contact."""
+SPECK, USUAL_ROW = 0.05, 75
+"""Fraction of the largest row from which a row shows smoke, not specks; and the percentile of the rows with smoke that
+counts as the largest where a floor contact is looked for."""
+
+FAINT_ROW = 0.02
+"""Fraction of the largest row from which a row shows where across the picture the smoke is; between such rows the
+places are interpolated."""
+
+CONTACT_ROWS = 12
+"""Rows of the upright plane, above the first one with smoke, that show how wide a floor contact is."""
+
+CONTACT_EDGES = (0.2, 0.5, 0.8)
+"""Fractions of the smoke above a floor contact that the rows reach at its front, middle and back."""
 
 WIDENING = 0.15
 """Growth of a column's radius per meter of height: it takes in air."""
@@ -137,7 +148,7 @@ def estimate_axis(
         return AxisEstimate(SmokeAxis.upright(base or 0.0), cue, base or 0.0, BOX_DEVIATION * reach)
     mean = replace(pictures[0], values=np.mean([picture.values for picture in pictures], 0))
     total = mean.total
-    smoky = total > 0.02 * total.max()
+    smoky = total > FAINT_ROW * total.max()
     middle = np.interp(mean.heights, mean.heights[smoky], mean.mean[smoky])
     offset = np.average(middle**2, weights=total)
     box = np.sqrt((BOX_COUNT * (BOX_DEVIATION * reach) ** 2 + offset) / (BOX_COUNT + 1))
@@ -223,13 +234,13 @@ def _floor_contact(
     if pixel > reach / 2:
         return None
     heights, total = picture.heights, picture.total
-    smoky = total > 0.05 * np.percentile(total[total > 0], 75)
+    smoky = total > SPECK * np.percentile(total[total > 0], USUAL_ROW)
     begins = heights[np.argmax(smoky)]
-    near = smoky & (heights <= begins + 12 * (heights[1] - heights[0]))
+    near = smoky & (heights <= begins + CONTACT_ROWS * (heights[1] - heights[0]))
     width = 2 * np.sqrt(3) * np.average(picture.spread[near], weights=total[near])
     level = np.median(total[smoky & (heights <= begins + width)])
     # where the rows first hold so much of their level
-    edges = np.interp(np.array([0.2, 0.5, 0.8]) * level, np.maximum.accumulate(total), heights)
+    edges = np.interp(np.array(CONTACT_EDGES) * level, np.maximum.accumulate(total), heights)
     up = edges + domain.centre[2] - domain.min[2]
     front, middle, back = np.where(up < above, distance * up / np.maximum(above - up, 1e-9), np.inf)
     # a disc on the floor is as deep as it is wide; the lower end of what floats takes many more rows

@@ -44,6 +44,10 @@ MAX_CHANGE = 0.25
 """Largest change of a voxel in one step, as a fraction of what it holds and the floor. Without it density spikes grow
 where few rays pass, at floor and ceiling (docs/experiments/density-descent.md)."""
 
+FIRST_GAIN = 0.1
+"""Fraction of the objective that the first step would gain if the objective were linear: of its curvature nothing is
+known yet."""
+
 MAX_FIRST_STEP = 1e30
 """Largest factor of the first step: a start of next to nothing asks for more than 32 bits hold."""
 
@@ -96,7 +100,7 @@ def descend(
         slope = _dot(gradient, direction)
         if not slope > 0:
             break
-        length = 1.0 if curvature.known else min(0.1 * loss / slope, MAX_FIRST_STEP)
+        length = 1.0 if curvature.known else min(FIRST_GAIN * loss / slope, MAX_FIRST_STEP)
         step = problem.step(current, loss, gradient, direction, length, bound, room)
         if step is None:
             problem.show(current)

@@ -17,7 +17,7 @@ from smokelift.checks import MAX_MAGNITUDE, Mask, listed, numbers, require_kind
 from smokelift.density.depth_prior import DepthEstimate, RoundDepth
 from smokelift.density.descent import descend
 from smokelift.density.multiplicative import fit_multiplicative
-from smokelift.density.objective import BLUR_REACH, camera_terms
+from smokelift.density.objective import BLUR_REACH, FAINT, camera_terms
 from smokelift.density.observation import Observation, ViewSet, eight_bit_plate
 from smokelift.extraction.element import extract_element, shows_transmittance, usual_source
 from smokelift.extraction.given_background import background_picture, single_color
@@ -34,9 +34,6 @@ range to 0 for a whole process: without this bound a resumed run would differ in
 SINGLE_VOXELS = 1.0
 """Standard deviation (voxels) of the Gaussian that keeps of a change what lobes share
 (docs/experiments/density-descent.md)."""
-
-FAINT = 1e-3
-"""Fraction of the largest density below which smoke is too faint for a ratio to say how it changes."""
 
 
 @dataclass(frozen=True)

@@ -48,6 +48,14 @@ MIN_PLAUSIBLE = 1e-6
 MIN_SCALE = 1e-30
 """Lower bound of that density, so that empty smoke is no division by zero."""
 
+STEP_BLUR = 0.7
+"""Standard deviation (pixels) of the Gaussian that smooths steps: one pixel's blur keeps neighboring rays from fighting
+over the voxels that they share."""
+
+MIN_TRUST = 1e-3
+"""Trust (1 where a pixel's contrast is far above its noise) at which the steps of a neighborhood are halved: where the
+picture says less, a ray keeps its smoke."""
+
 PROBE = 1.05
 """Factor on the density for the difference quotient dL / d ln s."""
 
@@ -162,10 +170,8 @@ def _log_scale(image: Image, transmittance: Image, sensitivity: Array, term: Ter
     gain = weight * sensitivity**2 / (sensitivity**2 + DAMPING**2)
     step = gain * np.log(np.clip(scale, *STEP_RANGE))
     trust = weight * power / (power + floor)
-    # one pixel's blur keeps neighboring rays from fighting over the voxels that they share
-    return np.asarray(
-        ndimage.gaussian_filter(trust * step, 0.7) / (ndimage.gaussian_filter(trust, 0.7) + 1e-3), np.float32
-    )
+    steps, trusts = (ndimage.gaussian_filter(each, STEP_BLUR) for each in (trust * step, trust))
+    return np.asarray(steps / (trusts + MIN_TRUST), np.float32)
 
 
 def _over_channels(a: Image, b: Image) -> Image:

@@ -42,6 +42,10 @@ MIN_COARSENED_VOXELS = 1_000_000
 TINY = np.finfo(np.float32).tiny
 """Smallest normal number, for divisions and logarithms."""
 
+FAINT = 1e-3
+"""Fraction of the largest density, or of the most smoke on a ray or a line, below which smoke is too faint for a ratio
+to say anything of it."""
+
 BLUR_REACH = 3.0
 """Reach of a blur in its standard deviations: 0.3 % of a Gaussian lie beyond."""
 

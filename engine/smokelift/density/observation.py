@@ -28,6 +28,10 @@ from smokelift.scene.checks import LARGEST
 THINNEST_CLEAR = 0.05
 """Lower bound of the transmittance: a brightness does not show an optical depth above 3."""
 
+MAX_KNOWN_DEPTH = 0.99
+"""Fraction of the optical depth at `THINNEST_CLEAR` from which one counts as that, and so as unknown; rounding makes it
+a little less."""
+
 SHADED, PATCH = 4.0, 3
 """Distance, in units of noise, by which a shaded side of smoke turns away from its source radiance, and pixels along
 it, at least (docs/experiments/thick-smoke.md)."""
@@ -300,7 +304,8 @@ def shadowed_optical_depth(view: ObservedView, image: Image, transmittance: Arra
     least = MIN_CONTRAST**2 * np.sum(usual * usual, -1)
     seen = np.sum((background - view.image) * contrast, -1) + least * -np.expm1(-view.optical_depth)
     fraction = seen / np.maximum(np.sum(contrast * contrast, -1) + least, 1e-12)
-    known = (fraction > 0) & (view.optical_depth < -0.99 * np.log(THINNEST_CLEAR))  # else as thick as can be shown
+    # else as thick as can be shown
+    known = (fraction > 0) & (view.optical_depth < -MAX_KNOWN_DEPTH * np.log(THINNEST_CLEAR))
     depth = np.where(known, SHADED_DEPTH * np.log1p(np.maximum(fraction, 0)), view.optical_depth)
     return np.where(view.mask, depth, 0).astype(np.float32)
 

@@ -25,6 +25,7 @@ import smokelift._core as _core
 from smokelift.checks import Array, Doubles, Mask
 from smokelift.density.hull import Places
 from smokelift.density.lattice_noise import Scatter
+from smokelift.density.objective import FAINT
 from smokelift.density.upright_plane import (
     TINY_DOUBLE,
     PlanePicture,
@@ -106,7 +107,7 @@ def _spread_along(plane: PlanePicture, turn: float, voxel_size: float) -> Double
     squares = np.maximum(second - first**2 / np.maximum(total, TINY_DOUBLE), 0)
     weight = ndimage.gaussian_filter1d(total, LINE_SMOOTHING) + 1e-6 * max(most, 1e-30)
     variance = ndimage.gaussian_filter1d(squares, LINE_SMOOTHING) / weight
-    known = np.flatnonzero(total > 1e-3 * most)
+    known = np.flatnonzero(total > FAINT * most)
     if known.size:
         variance = np.interp(np.arange(len(variance)), known, variance[known])
     return np.asarray(np.sqrt(np.maximum(variance, voxel_size**2))[line])
@@ -134,7 +135,7 @@ def ball_spread(optical_depth: Array, camera: Camera, domain: Domain) -> Array:
     """Standard deviation (m) along the depth of the balls that fill the silhouette, at each pixel (rows, columns)."""
     smoky = optical_depth > 0
     mask = optical_depth > SILHOUETTE * (np.percentile(optical_depth[smoky], 90) if smoky.any() else 1.0)
-    weight = optical_depth + 1e-3 * optical_depth.max(initial=1e-30)
+    weight = optical_depth + FAINT * optical_depth.max(initial=1e-30)
     total = ndimage.gaussian_filter(weight * mask, SMOOTHING) + 1e-30
     half = ndimage.gaussian_filter(weight * inflated(mask), SMOOTHING) / total
     return np.asarray(_pixel_size(camera, domain) * half / np.sqrt(3), np.float32)

@@ -23,7 +23,7 @@ from scipy import ndimage
 from smokelift.density.depth_prior import DepthEstimate, RoundDepth
 from smokelift.density.lattice_noise import SMALLEST_BLUR, Wander, stretched_noise
 from smokelift.density.multiplicative import fit_multiplicative, take_turns
-from smokelift.density.objective import TINY, Level
+from smokelift.density.objective import FAINT, TINY, Level
 from smokelift.density.observation import ObservedClip, ViewSet
 from smokelift.density.texture import ClipTexture, Exemplar, Picture, enlarged, fine_energy
 from smokelift.density.turntable import Turntable, UprightSmoke
@@ -239,7 +239,7 @@ class EveryView:
         wanted *= np.clip(outline / (OUTLINE * outline.max()) - 0.5, 0, 1)
         row_sums, have = (ndimage.gaussian_filter1d(picture.sum(0), 1) for picture in (known, wanted))
         wanted *= np.clip(row_sums / np.maximum(have, 1e-9), *ROW_RANGE)
-        faint = 1e-3 * wanted.max()
+        faint = FAINT * wanted.max()
         step = np.log(np.clip((wanted + faint) / (shown + faint), *STEP_RANGE))
         step = np.float32(relaxation) * isotropic_filter(step)
         now.scale(enlarged(step, scale, table.shape), degrees)

@@ -250,13 +250,16 @@ def likeliest_plate(frames: SomeFrames, source: Picture) -> HiddenPlate:
     best, least = np.zeros(len(nearby), np.int64), np.full(len(nearby), np.inf)
     away = [values - source for values, _ in seen]
     spread = np.square(BRIGHTNESS_RANGE)
+    # colors are normal with one variance v in all channels: each has a loss of (ln(2 pi v) + square / v) / 2
+    channels = source.size
     # another plate has any color, and explains no frame better than this one could
     any_color = np.log(np.maximum(high - low, EIGHT_BIT_STEP)).sum()
-    loss_of_another = np.maximum(any_color - 1.5 * np.log(2 * np.pi * np.mean([noise for _, noise in seen], axis=0)), 0)
+    usual_noise = np.mean([noise for _, noise in seen], axis=0)
+    loss_of_another = np.maximum(any_color - channels / 2 * np.log(2 * np.pi * usual_noise), 0)
     losses = np.zeros((len(seen), len(nearby)))
     for index, (color, smooth, number, clear) in enumerate(hypotheses):
         loss = _prior_loss(smooth, expected, plate.errors, high - low)
-        loss += 1.5 * DETAIL_WEIGHT * products[number][number] / (clear**2 * usual)
+        loss += channels / 2 * DETAIL_WEIGHT * products[number][number] / (clear**2 * usual)
         behind = color - source
         for frame, (_, noise) in enumerate(seen):
             squares = np.full(len(nearby), np.inf)
@@ -271,8 +274,8 @@ def likeliest_plate(frames: SomeFrames, source: Picture) -> HiddenPlate:
                 left = t / clear
                 detail = products[frame][frame] - 2 * left * products[number][frame]
                 detail += left**2 * products[number][number]
-                squares = np.minimum(squares, misfit + 3 * DETAIL_WEIGHT * detail)
-            losses[frame] = 0.5 * (OUTLIER_FREEDOM + 3) * np.log1p(squares / noise / OUTLIER_FREEDOM)
+                squares = np.minimum(squares, misfit + channels * DETAIL_WEIGHT * detail)
+            losses[frame] = (OUTLIER_FREEDOM + channels) / 2 * np.log1p(squares / noise / OUTLIER_FREEDOM)
         loss += _over_time(frames.independent * losses, frames.seconds_after, loss_of_another)
         loss = around(loss)
         best, least = np.where(loss < least, index, best), np.minimum(loss, least)
