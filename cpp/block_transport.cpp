@@ -26,19 +26,19 @@ namespace {
 
 constexpr float SPREAD = BlockTransport::SPREAD;
 
-// The diagonals (1, y, z) of four lines; the other four directions are their opposites.
+// The diagonals (1, y, z) of four lines (by definition); the other four directions are their opposites.
 constexpr int DIAGONALS = 4;
 constexpr int DIAGONAL_Y[DIAGONALS] = {1, 1, -1, -1}, DIAGONAL_Z[DIAGONALS] = {1, -1, 1, -1};
 
-// What an axis's beams carry: the mean with the slope along, and the two slopes across.
+// What an axis's beams carry (by definition): the mean with the slope along, and the two slopes across.
 constexpr int CARRIED = 3;
 
-constexpr int AXES = 3, WAYS = 2;  // x, y, z; forth (1) and back (-1)
-constexpr int DIAGONAL_FIELDS = 3; // sums of what arrives, of that with the direction's sign along y, along z
+constexpr int AXES = 3, WAYS = 2;  // x, y, z; forth (1) and back (-1) (by definition)
+constexpr int DIAGONAL_FIELDS = 3; // sums of what arrives, and by sign along y, along z (by definition)
 
-// Series in t, to rounding for t below THIN.
+// Series in t, the optical depth of a path, to rounding for t below THIN.
 constexpr float THIN = 1;
-constexpr int TERMS = 11;
+constexpr int TERMS = 11; // the next ones are below 1 / 12! (by definition)
 struct Series {
     float terms[TERMS];
 

@@ -17,7 +17,7 @@ namespace smokelift {
 struct Lattice {
     static constexpr int LANES = 8; // blocks that loops take at once, no row being shorter
 
-    static constexpr int ROWS = 4; // the same for rows
+    static constexpr int ROWS = 4; // rows that loops take at once
 
     Shape n{};
 
@@ -33,7 +33,7 @@ struct Lattice {
 class BlockTransport {
 public:
     static constexpr int FIELDS = Blocks::FIELDS;
-    static constexpr float SPREAD = 1.0f / 12; // mean of u^2, u from -1/2 to 1/2
+    static constexpr float SPREAD = 1.0f / 12; // mean of u^2, u from -1/2 to 1/2 (by definition)
 
     // Extinction in 1/m; `edge` is that of a block (m).
     BlockTransport(std::vector<float> extinction, const Lattice &lattice, float edge);

@@ -15,7 +15,7 @@ struct Blocks {
     int size = 1;
     std::array<int, 3> offset{};
 
-    static constexpr int FIELDS = 4; // of what is linear across a block
+    static constexpr int FIELDS = 4; // of what is linear across a block: mean and slopes (by definition)
 
     std::size_t count() const { return volume(n); }
 };

@@ -24,9 +24,9 @@
 namespace smokelift {
 namespace {
 
-constexpr int LANES = Rays::LANES, CHANNELS = 4;
-constexpr int RUNS_PER_TASK = 64, PLANES_PER_TASK = 16; // portions for a thread
-constexpr int TILE_ROWS = 16;                           // of pixels whose runs follow each other
+constexpr int LANES = Rays::LANES, CHANNELS = 4;        // extinction and colors (by definition)
+constexpr int RUNS_PER_TASK = 64, PLANES_PER_TASK = 16; // runs and planes at a time for a thread
+constexpr int TILE_ROWS = 16;                           // rows of pixels whose runs follow each other
 constexpr int AHEAD = 3; // planes before a look-up that its voxels are asked for
 
 template <int N> struct Floats {

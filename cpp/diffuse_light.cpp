@@ -13,8 +13,8 @@ namespace {
 using Fields = std::vector<float>;
 
 constexpr float SPREAD = BlockTransport::SPREAD;
-constexpr float TOLERANCE = 5e-4f; // of the mean radiance, relative
-constexpr int MAX_ITERATIONS = 100;
+constexpr float TOLERANCE = 5e-4f;  // residual of the mean radiance, over that of the first order
+constexpr int MAX_ITERATIONS = 100; // of conjugate gradients
 
 // visit(lattice_row, row) for the first blocks of all rows, with and without a border.
 template <class Visit> void over_rows(const Lattice &lattice, const Visit &visit) {

@@ -25,13 +25,13 @@ namespace {
 
 typedef float Four __attribute__((vector_size(16), aligned(4), may_alias));
 
-constexpr float R2 = 1.22474487f, R6 = 0.70710678f; // sqrt(3 / 2), sqrt(3 / 6)
-constexpr float BASIS[3][2] = {{R2, R6}, {0, -2 * R6}, {-R2, R6}};
-constexpr float MIN_OPACITY = 0.03f; // at which J is linearized, so that J can move where no smoke is yet
-constexpr float BRIGHTEST = 2;       // largest g
-constexpr float MAX_FIELD = 3;       // bound of the fields of J where they are linearized
-constexpr float ENOUGH = 1e-3f;      // residual, as a fraction of the first, where a solve ends
-constexpr int WINDOW = 2;            // level whose cells tell how certain T is: four cells wide
+constexpr float R2 = 1.22474487f, R6 = 0.70710678f;                // sqrt(3 / 2), sqrt(3 / 6) (by definition)
+constexpr float BASIS[3][2] = {{R2, R6}, {0, -2 * R6}, {-R2, R6}}; // of chroma, orthogonal (by definition)
+constexpr float MIN_OPACITY = 0.03f; // least 1 - T at which J is linearized: J can move where no smoke is yet
+constexpr float BRIGHTEST = 2;       // largest g: so it is 1 at 0, as is its slope (by definition)
+constexpr float MAX_FIELD = 3;       // bound of the fields of J, as of ln J, where they are linearized
+constexpr float ENOUGH = 1e-3f;      // residual, over the first, where a solve ends
+constexpr int WINDOW = 2;            // level, from 0, whose cells tell how certain T is: four fine cells wide
 constexpr float SPREAD = 0.4f; // of the sum over a coefficient's cells, the energy of its bilinear weights
 
 SMOKELIFT_INLINE Four load(const float *p) { return *reinterpret_cast<const Four *>(p); }
@@ -149,7 +149,7 @@ void invert(const float *matrix, float *inverse) {
             inverse[4 * row + column] = float(upper[std::min(row, column)][std::max(row, column)]);
 }
 
-constexpr int UPPER[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}}; // of the upper triangle of a symmetric matrix
+constexpr int UPPER[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}}; // of a symmetric matrix (by definition)
 
 // The inverse of a symmetric positive definite matrix of three rows, by cofactors.
 void invert(const float (&upper)[6], float (&inverse)[3][3]) {

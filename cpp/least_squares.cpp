@@ -22,8 +22,8 @@ void multiply(const float *__restrict a, float *__restrict out, std::size_t n) {
         out[i] *= a[i];
 }
 
-// Enough blocks of slabs for some threads, each of so many that the slabs computed twice at its ends hardly
-// count.
+// Enough blocks of slabs (planes of voxels) for some threads, each of so many that the slabs computed twice
+// at its ends hardly count.
 constexpr int BLOCKS = 8, MIN_SLABS = 4, MAX_SLABS = 16;
 
 } // namespace

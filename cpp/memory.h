@@ -18,7 +18,7 @@ namespace smokelift {
 // pages. A large array has pages of its own, which hold zeros and go back to the system with the array. They
 // are large pages where the system has them: in small ones the look-ups of rays would cost as much again.
 template <class T> struct LazyPages {
-    static constexpr std::size_t LARGE_PAGE = std::size_t(1) << 21; // bytes, on x86-64 and most others
+    static constexpr std::size_t LARGE_PAGE = std::size_t(1) << 21; // bytes, of most systems (by definition)
 
     using value_type = T;
 

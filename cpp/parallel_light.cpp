@@ -21,7 +21,7 @@
 namespace smokelift {
 namespace {
 
-constexpr int ROWS_PER_TASK = 12; // of columns: their sums stay in the cache
+constexpr int ROWS_PER_TASK = 12; // rows of columns of voxels: their sums stay in the cache
 
 struct Columns {
     const ParallelLight &light;

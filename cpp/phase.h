@@ -8,8 +8,8 @@
 
 namespace smokelift {
 
-constexpr float PI = 3.14159265f;
-// Least square of a distance to the eye, and least 1 + g^2 - 2 g cosine: nothing is divided by 0.
+constexpr float PI = 3.14159265f; // (by definition)
+// Least square of a distance to the eye (m^2), and least 1 + g^2 - 2 g cosine: nothing is divided by 0.
 constexpr float MIN_SQUARE = 1e-30f, MIN_BASE = 1e-6f;
 
 // A value that changes linearly along the row: value(c) = at_0 + c step, in each of the three axes.

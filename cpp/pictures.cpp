@@ -8,10 +8,10 @@
 namespace smokelift {
 namespace {
 
-constexpr std::size_t READS_PER_TASK = 1 << 16;
-constexpr int TOGETHER = 256;       // voxels along z that are computed together
-constexpr int RUN = 32;             // voxels along z that are projected together
-constexpr double MIN_DEPTH = 1e-12; // m; a voxel in the plane of the eye is in no picture
+constexpr std::size_t READS_PER_TASK = 1 << 16; // points of a picture
+constexpr int TOGETHER = 256;                   // voxels along z that are computed together
+constexpr int RUN = 32;                         // voxels along z that are projected together
+constexpr double MIN_DEPTH = 1e-12;             // m; a voxel in the plane of the eye is in no picture
 
 // Homogeneous pixel coordinates along a row of voxels.
 struct PixelRow {

@@ -19,7 +19,7 @@
 namespace smokelift {
 namespace {
 
-constexpr int ROWS_PER_TASK = 8; // of columns
+constexpr int ROWS_PER_TASK = 8; // rows of columns of voxels
 
 // A face with the light it belongs to, over a grid.
 struct Cone : PointLight::Face {

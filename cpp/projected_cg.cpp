@@ -12,7 +12,7 @@ namespace {
 
 // Steps that may pass without a new least gradient. In single precision the gradient stops falling somewhere,
 // and steps beyond that lead away from the minimum; far from there it may rise for a while all the same.
-constexpr double NEAR_ROUNDING = 1e-8; // square of the gradient, over that of the fluid at rest
+constexpr double NEAR_ROUNDING = 1e-8; // Square of the gradient, over that of the fluid at rest.
 constexpr int PATIENCE_FAR = 20, PATIENCE_NEAR = 1;
 
 int patience(double least, double reference) {

@@ -12,9 +12,9 @@
 namespace smokelift {
 namespace {
 
-constexpr int taps = 3;   // a square's shadow is at most sqrt(2) pixels wide
+constexpr int taps = 3;   // pixels of a square's shadow, at most sqrt(2) wide (by definition)
 constexpr int chunk = 64; // voxels of a column at a time
-constexpr std::size_t columns_per_task = 4096;
+constexpr std::size_t columns_per_task = 4096; // of voxels
 
 double ramp(double x) { return x > 0 ? x * x / 2 : 0; }
 

@@ -14,7 +14,7 @@ namespace smokelift {
 
 using Stride = std::ptrdiff_t;
 
-// The two other axes of each axis.
+// The two other axes of each axis (by definition).
 constexpr int LATERAL[3][2] = {{1, 2}, {0, 2}, {0, 1}};
 
 // `width` floats per voxel: extinction (1/m), then in-scattered radiance J by channel (or derivatives by

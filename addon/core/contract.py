@@ -13,7 +13,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
-DONE, BAD_INPUT, CANCELLED = 0, 2, 130  # exit statuses of the command line; 3 is a missing device or too little memory
+DONE, BAD_INPUT, CANCELLED = 0, 2, 130  # exit statuses (by definition); 3 is a missing device or too little memory
 INDEX_FILE = "sequence.json"  # file in a sequence's directory with scene, settings and finished frames
 MADE_UP = "made up"  # origin, in the sequence's provenance, of what no camera shows and clips do not determine
 
@@ -22,7 +22,7 @@ FRAME_FILE = "smoke_{:04d}.vdb"
 first."""
 
 PROXY_FILE = "proxy_{:04d}.vdb"  # there too, and in a folder with an export: the coarse copy of a frame
-PROXY_VOXELS = 4_000_000  # voxels of a box from which on a run writes coarse copies
+PROXY_VOXELS = 4_000_000  # voxels of a box from which on a run writes coarse copies (measured: MIN_PROXY_VOXELS)
 EXPORT_FILE = "export.json"  # file in a folder with an export that says what was exported
 ASSET_FILE = "smoke.blend"  # file in a folder with an export: the add-on's own, which the engine leaves alone
 
@@ -53,7 +53,7 @@ DIRECTIONS = {
 }
 """What the engine makes of a take, with the options that decide the result; ``--mesh`` names a file besides."""
 
-SLOWEST, FASTEST = 0.01, 100.0  # speeds that retiming has
+SLOWEST, FASTEST = 0.01, 100.0  # speeds of retiming over the take's, at least and at most
 SHORTEST = 4  # frames that a take has at least, if something is made of it
 ZIP_FILE = "smokelift-{version}-{blenders}-{platform}.zip"  # name of the extension's zip; the platform has _ for -
 BLENDERS = {"3.11": "blender4.2-5.0", "3.13": "blender5.1"}  # in a zip's name, by its version of Python

@@ -33,7 +33,7 @@ LIBRARIES = f"python{sys.version_info.major}.{sys.version_info.minor}"
 """Folder of an extension that the engine imports from: what is compiled is for one version of Python."""
 
 LINES_PER_POLL = 500  # lines read in one poll, at most, so that many lines do not delay the caller
-LONGEST_LINE = 2**20  # bytes
+LONGEST_LINE = 2**20  # bytes of a line, at most
 GRACE_SECONDS = 8.0  # time for a cancelled engine to end by itself. It writes files whole, so killing it does no harm
 DRAIN_SECONDS = 1.0  # time for the last lines after the engine's end; a child of its own may hold the pipe open
 

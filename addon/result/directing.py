@@ -20,9 +20,9 @@ from ..scene.blender import at_frame
 from ..scene.smoke import scene_of
 
 BLOWING = ("WIND", "FORCE")  # force fields that blow along their Z axis
-UNSIZED = 1.0  # what Blender takes for the size of turbulence that has none
+UNSIZED = 1.0  # m; what Blender takes for the size of turbulence that has none (by definition)
 MESHES = {"MESH", "CURVE", "SURFACE", "FONT", "META"}  # objects that have a surface
-STL_HEADER = 80  # bytes before the number of triangles
+STL_HEADER = 80  # bytes before the number of triangles (by definition)
 
 
 def engine_request(smoke: bpy.types.Object) -> tuple[str, list[str], list[bytes]]:

@@ -15,7 +15,7 @@ from ..core.job import Job, engine_command
 from ..scene.blender import call_later, redraw, thread_options
 from ..scene.smoke import find_smoke
 
-TICK_SECONDS = 0.1  # between two readings of what the engine says
+TICK_SECONDS = 0.1  # time between two readings of what the engine says
 REST_SECONDS = 0.4  # time without a change of settings before the engine is asked what they come to
 End = Callable[[bpy.types.Object, Job], None]  # called with the smoke and the job when that has ended
 

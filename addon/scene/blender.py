@@ -48,7 +48,7 @@ def relative(path: Path, folder: Path | None = None) -> str:
         return str(path)
 
 
-REDRAW_SECONDS = 0.5  # between two drawings of the tab while something counts in it
+REDRAW_SECONDS = 0.5  # time between two drawings of the tab while something counts in it
 _drawn_at = 0.0  # when the tab was drawn last because something counted in it (s)
 
 

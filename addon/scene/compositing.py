@@ -19,7 +19,7 @@ from .volume import shown
 GROUP = "Smokelift Composite"  # name of the node group, and of its node in the scene's compositor
 MARK = "smokelift_composite"  # custom property by which the group is known under any name
 FLOOR = "Smokelift Floor"  # name of the plane that catches the shadow
-FLOOR_WIDTHS = 2.0  # width of that plane over the box's: room for the shadow, and little beyond a wall behind the smoke
+FLOOR_WIDTHS = 2.0  # width of the plane over the box's: room for the shadow, and little beyond a wall behind the smoke
 _ENGINE = "smokelift_engine"  # custom property of the scene: the render engine that it had before
 HOLDOUTS = "Smokelift Holdouts"  # name of the collection whose objects hide the smoke, and show the plate
 
@@ -30,7 +30,7 @@ pixel."""
 _CLIP_SIZE = ("Clip Width", "Clip Height")
 """Names of the group's inputs for the clip's size: grain is as wide as its pixels, whatever the render's size."""
 
-LARGEST_DIFFERENCE = 0.05  # of clip and plate, blurred (linear): beyond it is smoke, whose detail is no grain
+LARGEST_DIFFERENCE = 0.05  # of clip and plate, blurred (linear radiance): beyond it is smoke, whose detail is no grain
 
 _INPUTS = (
     color("Render", 0.0, 0.0, 0.0, 0.0)("The smoke on transparent film"),

@@ -14,7 +14,7 @@ from .nodes import add_node, color, empty_material, file_group, math_node, numbe
 NODE = "Smokelift"  # name of the node that holds the values; a material without it is the artist's own
 GROUP = "Smokelift Look"  # name of the node group
 MARK = "smokelift_look"  # custom property by which the group is known under any name
-BLACKBODY_KELVIN = 1000.0  # temperature that a grid's value of 1 stands for; that of Blender's Principled Volume
+BLACKBODY_KELVIN = 1000.0  # of a grid's value of 1: that of Blender's Principled Volume (by definition)
 MIN_RATIO = 1e-3  # density over the edge's, below which edges do not change any more; keeps the power of it finite
 
 _INPUTS = (

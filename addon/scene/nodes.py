@@ -9,7 +9,7 @@ from mathutils import Vector
 Tree, Socket = bpy.types.NodeTree, bpy.types.NodeSocket
 
 SINCE_5 = bpy.app.version >= (5, 0, 0)  # the compositor is a node group, with the shaders' Mix node
-SPACING = 200.0  # distance from one column or row of nodes to the next
+SPACING = 200.0  # pixels from one column or row of nodes to the next
 
 
 class Input(NamedTuple):

@@ -19,14 +19,14 @@ from .smoke import ASSUMED_CAMERA, hide_default_lamp, scene_of, smokes
 
 NAME = "Smokelift"
 
-NEW_RANGE = (1, 250)  # frames of a new file of Blender
-SENSOR_WIDTH = 36.0  # millimeters; Blender's default
-BOUNCES = 128  # how often Cycles scatters light in smoke that was fitted with scattering of all orders
-NEW_SAMPLES = 4096  # Cycles' samples per pixel in a new file
+NEW_RANGE = (1, 250)  # frames of a new file of Blender (by definition)
+SENSOR_WIDTH = 36.0  # millimeters; Blender's default (by definition)
+BOUNCES = 128  # of light in Cycles, in smoke fitted with scattering of all orders (docs/experiments/scattering.md)
+NEW_SAMPLES = 4096  # Cycles' samples per pixel in a new file (by definition)
 
 SAMPLES = 32
 """Samples per pixel of a set-up in a new file: marching through smoke and denoised, the example's 640 x 960 pixels take
-two slow cores a minute, and differ from the clip by 2 of 255 (root mean square)."""
+two slow cores a minute, and differ from the clip by 2 of 255, root mean square (measured)."""
 
 
 def match_clip(smoke: bpy.types.Object) -> None:

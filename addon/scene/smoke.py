@@ -10,7 +10,7 @@ from mathutils import Matrix, Vector
 from .blender import preferred
 
 LAMP_OF_A_NEW_FILE = (4.0762453, 1.0054539, 5.9038620), 1000.0
-"""Place (m) and power (W) of the point light that Blender's own new file begins with."""
+"""Place (m) and power (W) of the point light that Blender's own new file begins with (by definition)."""
 
 ASSUMED_CAMERA = "Smokelift Camera"  # name of a camera that stands where the engine assumed the clip's
 
