@@ -1,4 +1,4 @@
-"""Every numeric constant of the engine: its value, its meaning with its unit, and what set it, read from the code.
+"""Every numeric constant of engine, core and add-on: value, meaning with unit, and what set it, read from the code.
 
 python tools/constants.py        # prints what the manual's page "Constants" shows
 """
@@ -17,10 +17,14 @@ ROOT = Path(__file__).resolve().parents[1]
 BY_HAND = "by hand"
 
 SWEEPS = {
+    "addon": "No benchmark moves them: limits and waits, and how a result is set up and shown.",
     "app": "No benchmark moves them: they bound arguments, and say when something is said.",
     "baselines": "`python -m benchmarks.accuracy OUT SCENES/plume-1 --runs paper`",
     "batch": "No benchmark moves them: they are waits for other programs, and tries.",
     "checks": "`python -m benchmarks.stability FOLDER` shows that what lies beyond is refused; nothing moves them.",
+    "cpp": "Portions and lanes: `python -m benchmarks.renderer` and `python -m benchmarks.velocity "
+    "SCENES/plume-1/truth.npz`; `diffuse_light`: `python -m benchmarks.renderer.agreement --mitsuba PYTHON`; "
+    "`extraction`, `projected_cg`: as the packages `extraction`, `velocity`.",
     "density": "`python -m benchmarks.accuracy OUT SCENES/{plume,two,jet,puff}-1 --runs balanced balanced:detail=0`",
     "direct": "`python -m benchmarks.direct.continuation SCENES/{plume,two,jet}-1`; growth, wind and loops: "
     "`python -m benchmarks.direct.leaving SMOKE OUT`",
@@ -50,6 +54,13 @@ OF_MODULE = re.compile(r"Constants that say no other source: (docs/[\w/-]+\.md)"
 REPEATED = re.compile(r" \((?:by hand|by definition|docs/[^()]*)\)")
 """What the column of sources says again."""
 
+DECLARED = re.compile(r"(?:    static )?constexpr (?:float|double|int|std::size_t) ([^;]*);(?: +// (.*))?")
+DECLARATIONS = re.compile(rf"((?:^ *//.*\n)*)((?:^{DECLARED.pattern}\n)+)", re.MULTILINE)
+"""Lines of C++, outside functions, that declare numbers, and the comment above them."""
+
+LITERAL = re.compile(r'(?:"[^"]*"|[-\d\s(),.*e_])+')
+"""The add-on's values that are numbers alone, and the words for them: no paths, flags or interfaces of nodes."""
+
 
 class Constant(NamedTuple):
     """A numeric constant, or those of one line; ``meaning`` is its docstring, empty if it has none."""
@@ -65,7 +76,9 @@ class Constant(NamedTuple):
 def constants(path: Path) -> list[Constant]:
     """Return the constants of a module in whose values there are numbers, in the order of its lines."""
     text = path.read_text(encoding="utf-8")
-    tree = ast.parse(text)
+    if path.suffix != ".py":
+        return _of_cpp(path, text)
+    tree, lines = ast.parse(text), text.splitlines()
     of_module = "".join(OF_MODULE.findall(" ".join((ast.get_docstring(tree) or "").split())))
     module = path.parent.name if path.stem == "__init__" else path.stem
     found = []
@@ -79,26 +92,45 @@ def constants(path: Path) -> list[Constant]:
             case ast.Expr(value=ast.Constant(value=str() as string)):
                 meaning = " ".join(string.split())
             case _:
-                meaning = ""
+                meaning = lines[(node.end_lineno or 1) - 1].partition("  # ")[2]
         if name.isupper() and any(_is_number(part) for part in ast.walk(value)):
             written = " ".join((ast.get_source_segment(text, value) or "").split())
             found.append(Constant(module, name, written, meaning, _source(meaning) or _source(of_module) or BY_HAND))
     return found
 
 
+def packages() -> dict[str, list[Constant]]:
+    """Return the constants of every package of the engine, of the core and of the add-on, whose panels only show."""
+    folders = [path.parent for path in (ROOT / "engine" / "smokelift").glob("*/__init__.py")]
+    files = {folder.name: sorted(folder.rglob("*.py")) for folder in folders}
+    files["addon"] = [path for path in sorted((ROOT / "addon").rglob("*.py")) if path.parent.name != "panel"]
+    files["cpp"] = sorted(path for path in (ROOT / "cpp").iterdir() if path.suffix in (".cpp", ".h"))
+    found = {name: [row for path in files[name] for row in constants(path)] for name in sorted(files)}
+    found["addon"] = [row for row in found["addon"] if LITERAL.fullmatch(row.value)]
+    return {name: rows for name, rows in found.items() if rows}
+
+
 def markdown() -> str:
-    """Return the constants of every package of the engine as a table below its sweep."""
+    """Return the constants of every package as a table below its sweep."""
     parts = []
-    for folder in sorted(path.parent for path in (ROOT / "engine" / "smokelift").glob("*/__init__.py")):
-        rows = [row for path in sorted(folder.rglob("*.py")) for row in constants(path)]
-        if rows:
-            count = sum(row.set_by == BY_HAND for row in rows)
-            parts += [
-                f"## {folder.name}",
-                f"Set by hand: {count} of {len(rows)}. {SWEEPS.get(folder.name, '')}",
-                _table(rows),
-            ]
+    for name, rows in packages().items():
+        count = sum(row.set_by == BY_HAND for row in rows)
+        parts += [f"## {name}", f"Set by hand: {count} of {len(rows)}. {SWEEPS.get(name, '')}", _table(rows)]
     return "\n\n".join(parts)
+
+
+def _of_cpp(path: Path, text: str) -> list[Constant]:
+    """Constants of a C++ file, each with the comment above its lines and that beside it."""
+    found = []
+    for above, lines, *_ in DECLARATIONS.findall(re.sub(r"\n {8,}//", "", text)):
+        for declared, beside in DECLARED.findall(lines):
+            meaning = " ".join(f"{above} {beside}".replace("//", " ").split())
+            for each in re.split(r", (?=\w+(?:\[\w+\])* = )", declared):
+                name, _, value = each.partition(" = ")
+                if re.search(r"\d", value):
+                    name = name.partition("[")[0]
+                    found.append(Constant(path.name, name, value, meaning, _source(meaning) or BY_HAND))
+    return found
 
 
 def _table(rows: list[Constant]) -> str:

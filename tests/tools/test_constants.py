@@ -18,19 +18,47 @@ COMMANDS = sorted(
 )
 
 
-def test_every_constant_of_the_engine_has_a_meaning() -> None:
-    found = [row for path in ENGINE.rglob("*.py") for row in constants.constants(path)]
-    assert len(found) > 400
+def test_every_constant_has_a_meaning() -> None:
+    found = [row for rows in constants.packages().values() for row in rows]
+    assert len(found) > 550
     assert [(row.module, row.name) for row in found if not row.meaning] == []
 
 
 def test_every_package_with_constants_set_by_hand_says_what_would_move_them() -> None:
-    by_hand = {
-        path.relative_to(ENGINE).parts[0]
-        for path in ENGINE.rglob("*.py")
-        if any(row.set_by == constants.BY_HAND for row in constants.constants(path))
-    }
-    assert by_hand == set(constants.SWEEPS)
+    found = constants.packages().items()
+    assert {name for name, rows in found if any(row.set_by == constants.BY_HAND for row in rows)} == set(
+        constants.SWEEPS
+    )
+
+
+def test_packages_are_those_of_the_engine_its_core_and_what_decides_in_the_addon() -> None:
+    found = constants.packages()
+    assert set(found) - {path.name for path in ENGINE.iterdir()} == {"addon", "cpp"}
+    assert {"MIN_OPACITY", "TOLERANCE", "PATIENCE_FAR"} <= {row.name for row in found["cpp"]}
+    names = {row.name for row in found["addon"]}
+    assert {"MATCHES", "GOOD_DEGREES", "SLOWEST, FASTEST"} <= names
+    assert not {"HOME", "PRESETS", "SINCE_5", "NEW_WIDTH"} & names
+
+
+def test_constants_of_the_core_have_the_comments_above_and_beside_them(tmp_path) -> None:
+    source = tmp_path / "light.h"
+    source.write_text(
+        "constexpr float TOLERANCE = 5e-4f, MIN[2] = {0, 1}; // of light,\n"
+        "                                                    // relative (measured)\n"
+        "constexpr int BARE = 1;\n"
+        "// Orders (docs/experiments/scattering.md).\n"
+        "constexpr int FIRST = Orders::FIRST, LAST = 9;\n"
+        "    static constexpr std::size_t ROWS = 4; // at once\n"
+        'static constexpr auto name = const_name("Array1");\n'
+        "int f() {\n    constexpr int INSIDE = 3;\n    return INSIDE;\n}\n"
+    )
+    assert [row[1:] for row in constants.constants(source)] == [
+        ("TOLERANCE", "5e-4f", "of light, relative (measured)", "measured"),
+        ("MIN", "{0, 1}", "of light, relative (measured)", "measured"),
+        ("BARE", "1", "", constants.BY_HAND),
+        ("LAST", "9", "Orders (docs/experiments/scattering.md).", "[scattering](experiments/scattering.md)"),
+        ("ROWS", "4", "Orders (docs/experiments/scattering.md). at once", "[scattering](experiments/scattering.md)"),
+    ]
 
 
 @pytest.mark.parametrize(("module", "words"), COMMANDS, ids=[module for module, _ in COMMANDS])
@@ -52,12 +80,14 @@ def test_a_constant_without_a_meaning_or_a_source_is_seen(tmp_path) -> None:
         "BARE = 2.0\n"
         'GIVEN, OTHER = 1, 2\n"""Voxels (docs/experiments/wander.md), and (by definition) pixels."""\n'
         'WEIGHT: float = -0.5\n"""Weight (Author, "Title", 2011)."""\n'
+        "SECONDS = 2  # between two readings (measured)\n"
         "def f() -> int:\n    INSIDE = 3\n    return INSIDE\n"
     )
     assert [(row.name, row.value, row.meaning != "", row.set_by) for row in constants.constants(module)] == [
         ("BARE", "2.0", False, "by hand"),
         ("GIVEN, OTHER", "1, 2", True, "[wander](experiments/wander.md); by definition"),
         ("WEIGHT", "-0.5", True, 'Author, "Title", 2011'),
+        ("SECONDS", "2", True, "measured"),
     ]
 
 
