@@ -1,4 +1,5 @@
-// The linearized estimate of a velocity (equations 11 to 13): a quadratic function of faces, voxels per frame.
+// The linearized estimate of a velocity (equations 11 to 13): a quadratic function of the face velocities, in
+// cells per frame.
 #pragma once
 
 #include "grid.h"
