@@ -3,6 +3,11 @@
 from collections.abc import Collection, Mapping
 from typing import Any
 
+_SIMULATED = (
+    "Frames {first} to {last} are a simulation that starts from frame {frame}, with the buoyancy, dissipation, inflow "
+    "and fire of the clip, as far as it shows them"
+)
+
 SENTENCES = {
     "reconstructed": "Match to the clip: {psnr}. {frames} in {seconds}.",
     "written": "{frames} in {seconds}.",
@@ -37,6 +42,11 @@ SENTENCES = {
     "dissolving smoke": (
         "From frame {frame} on the smoke dissolves before it reaches the end of its box, because the box cannot grow "
         "any more. Give it more Room than {room:g}, or move the camera or lamp in its way."
+    ),
+    "simulated frames": _SIMULATED + ".",
+    "simulated frames with given values": _SIMULATED + ", but with a given {given}.",
+    "overlap of a loop": (
+        "In frames {first} to {last} the end of the loop becomes its start: both are carried to a shape between them."
     ),
 }
 """Sentences by kind, with the figures that the engine gives."""
@@ -80,7 +90,8 @@ POOR = "poor"  # the word for a PSNR below these
 UNRATED = ("smoke in the background", "background never seen")
 """Doubts with which smoke may match its clip well and still be wrong: a part of it is in the background."""
 
-OF_RESULT = ("dissolving smoke",)  # sentences whose frames are counted from the first of the result, from 1
+OF_RESULT = ("dissolving smoke", "simulated frames", "simulated frames with given values", "overlap of a loop")
+"""Sentences whose frames are counted from the first of the result, from 1."""
 
 
 def sentence(message: Mapping[str, Any], before: int = 0, doubts: Collection[str] = ()) -> str:

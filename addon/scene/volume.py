@@ -1,7 +1,6 @@
 """The result: a Volume object that plays the sequence, with a material of the smoke's optical properties."""
 
 import math
-import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -9,6 +8,7 @@ import bpy
 from mathutils import Vector
 
 from ..core.contract import DIRECTIONS, FRAME_FILE, MADE_UP, PROXY_FILE, retiming
+from ..core.sentences import sentence
 from ..core.take import TITLES, Snapshot, Take
 from .blender import absolute, file_of, frame_rate, relative, set_unless_changed
 from .geometry import engine_to_world
@@ -22,8 +22,6 @@ EARLY = 0.001  # frames by which a frame of the clip is shown early, so that rou
 GOOD_DEGREES = 30
 """Degrees beside its camera at which smoke of one camera still has what `sentences` calls good, about 28 dB: 29.0 at 20
 and 25.1 at 45 degrees, mean of four scenes, smooth (docs/accuracy.md)."""
-
-_FRAMES = re.compile(r"[Ff]rames? \d+(?: to \d+)?")  # frames that a sentence of the engine names
 
 PROVENANCE = "smokelift_provenance"
 """Custom property of the Volume that says what of the smoke is measured, also where its files are not at hand."""
@@ -153,7 +151,7 @@ def _provenance(now: Snapshot, before: int) -> str:
     """
     parts = now.index.get("provenance", [])
     done = [part for part in parts if part["what"] in DIRECTIONS]
-    directed = [_renumbered(part["how"], before) for part in done[-1:]]
+    directed = [sentence({"text": part["how"], **part}, before) for part in done[-1:]]
     if len(done) > 1:
         directed.append(f"Before that: {', '.join(TITLES[part['what']] for part in done[:-1])}.")
     parts = [part for part in parts if part["what"] not in DIRECTIONS]
@@ -167,11 +165,6 @@ def _provenance(now: Snapshot, before: int) -> str:
     seen = "What the camera sees is measured"
     seen += "." if now.scene.get("views") else f", good to about {GOOD_DEGREES} degrees beside it."
     return " ".join([seen, what, *directed])
-
-
-def _renumbered(words: str, before: int) -> str:
-    """A sentence of the engine, which counts the frames of a result from 1, with so many frames before them."""
-    return _FRAMES.sub(lambda named: re.sub(r"\d+", lambda number: str(int(number[0]) + before), named[0]), words)
 
 
 def correct_positions(_file: str = "") -> None:

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from smokelift.checks import Finding
 from smokelift.direct.fitting import BUOYANCY_FRAMES, coarsen_state, fit_simulation, spin_up
 from smokelift.direct.mesh import Mesh
 from smokelift.direct.state import (
@@ -278,14 +279,12 @@ def continue_sequence(
         "obstacles": [each.fingerprint() if isinstance(each, Mesh) else vars(each) for each in continuation.obstacles],
     }
     given = [name for name in ("buoyancy", "dissipation") if settings[name] is not None]
-    found = [name for name in ("buoyancy", "dissipation") if name not in given]
-    how = (
-        f"Frames {start + 1} to {last} are a simulation that starts from frame {start}, with the "
-        f"{', '.join([*found, 'inflow'])} and fire of the clip, as far as it shows them"
-        + (f", and a given {' and '.join(given)}." if given else ".")
+    made = Finding(
+        "simulated frames with given values" if given else "simulated frames",
+        {"frame": start, "first": start + 1, "last": last, "given": " and ".join(given)},
     )
     camera_frames = [float(number) for number in range(copied[0], last + 1)]
-    with directed_writer(sequence, out, "continue", settings, how, camera_frames, npz=npz, resume=resume) as writer:
+    with directed_writer(sequence, out, "continue", settings, made, camera_frames, npz=npz, resume=resume) as writer:
         if writer.state is None and writer.finished:
             return
         for number in copied:

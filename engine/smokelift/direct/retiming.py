@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from smokelift.checks import Doubles
+from smokelift.checks import Doubles, Finding
 from smokelift.direct.state import (
     MIN_FRAMES,
     SmokeState,
@@ -69,11 +69,11 @@ def retime_sequence(
     """
     times, speeds_shown = playback(len(sequence.frames), speeds)
     first, dt = sequence.frames[0], 1 / sequence.fps
-    how = "Frames between those of the clip are made of both neighbors, carried there by the velocity."
+    made = Finding("interpolated frames")
     camera_frames = [first + float(at) for at in times]
     pair: dict[int, SmokeState] = {}
     with directed_writer(
-        sequence, out, "retime", {"speeds": speeds}, how, camera_frames, npz=npz, resume=resume
+        sequence, out, "retime", {"speeds": speeds}, made, camera_frames, npz=npz, resume=resume
     ) as writer:
         for number, (at, speed) in enumerate(zip(times.tolist(), speeds_shown.tolist(), strict=True), 1):
             if number in writer.finished:
@@ -147,9 +147,9 @@ def loop_sequence(
     """
     length = loop_length(sequence, first, last, overlap)
     settings = {"frames": [first, last], "overlap": overlap}
-    how = f"In frames 1 to {overlap} the end of the loop becomes its start: both are carried to a shape between them."
+    made = Finding("overlap of a loop", {"first": 1, "last": overlap})
     camera_frames = [float(first + n) for n in range(length)]
-    with directed_writer(sequence, out, "loop", settings, how, camera_frames, npz=npz, resume=resume) as writer:
+    with directed_writer(sequence, out, "loop", settings, made, camera_frames, npz=npz, resume=resume) as writer:
         for index in range(length):
             number, source = index + 1, first + index
             if number in writer.finished:

@@ -11,10 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from smokelift.checks import Mask, counted
+from smokelift.checks import Finding, Mask, counted
 from smokelift.output.index import INDEX, checksum
 from smokelift.output.sequence import Sequence
 from smokelift.output.writer import SequenceWriter
+from smokelift.report.sentences import part
 from smokelift.transport import Array, Velocity, advect, divergence, faces_in, on_faces, project
 from smokelift.transport.pressure import project_with_given_faces
 
@@ -133,7 +134,7 @@ def directed_writer(
     out: str | Path,
     job: str,
     settings: Mapping[str, Any],
-    how: str,
+    made: Finding,
     camera_frames: list[float],
     *,
     npz: bool,
@@ -141,7 +142,7 @@ def directed_writer(
 ) -> SequenceWriter:
     """The writer of a sequence that is made from another, of which `open_source` knows that it has enough frames.
 
-    The job and its settings are kept in the settings under ``direct``, and ``how`` says the same as a sentence for
+    The job and its settings are kept in the settings under ``direct``; what it has ``made`` of the smoke is said in
     the provenance. Every frame that is written has the camera of a frame of `sequence`: ``camera_frames`` are their
     numbers, from 1, between frames the nearest, beyond them the last. ``npz`` and ``resume`` are those of
     `SequenceWriter`. Jobs yield the number and the figures of every frame, which is written already.
@@ -159,7 +160,7 @@ def directed_writer(
         resume=resume,
         start_number=sequence.start_number,
         choices=sequence.choices,
-        provenance=[*sequence.provenance, {"what": job, "origin": "made up", "how": how, "settings": {}}],
+        provenance=[*sequence.provenance, part(replace(made, about=job, source="made up"))],
         sources={"sequence": {INDEX: checksum([sequence.directory / INDEX])}},
     )
 

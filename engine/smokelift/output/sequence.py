@@ -43,8 +43,8 @@ class Sequence:
         What was chosen for the clip: ``what``, ``chosen``, ``kind``, ``reason``, ``measured``, ``tolerance`` and
         ``by_hand`` of each (see `smokelift.report`).
     provenance
-        What of the result is measured, estimated, assumed and made up: ``what``, ``origin``, ``how`` and ``settings``
-        of each part (see `smokelift.report`).
+        What of the result is measured, estimated, assumed and made up: ``what``, ``origin``, ``how``, ``kind``,
+        ``figures`` and ``settings`` of each part (see `smokelift.report`).
     start_number
         Number in the names of the files of frame 1.
     """

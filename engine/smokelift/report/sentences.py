@@ -22,6 +22,11 @@ MODELS: Mapping[object, str] = {
 MIN_DEPTH = 0.005
 """Smallest distance (m) from the middle of the box that is said: less would look exact."""
 
+_SIMULATED = (
+    "Frames {first} to {last} are a simulation that starts from frame {frame}, with the buoyancy, dissipation, inflow "
+    "and fire of the clip, as far as it shows them"
+)
+
 SENTENCES: Mapping[str, str] = {
     # how the clips are read
     "truncated clip": (
@@ -283,6 +288,14 @@ SENTENCES: Mapping[str, str] = {
         "Seen from sides that no camera is near, the smoke has the texture of the clip's own pictures. Another seed "
         "makes another texture; detail 0 makes none."
     ),
+    "simulated frames": _SIMULATED + ".",
+    "simulated frames with given values": _SIMULATED + ", but with a given {given}.",
+    "interpolated frames": (
+        "Frames between those of the clip are made of both neighbors, carried there by the velocity."
+    ),
+    "overlap of a loop": (
+        "In frames {first} to {last} the end of the loop becomes its start: both are carried to a shape between them."
+    ),
     # what is said of a result
     "reconstructed": (
         "{frames:frame} in {directory} ({seconds:.0f} s), {psnr:.1f} dB inside the smoke at the clip's pixels (median)."
@@ -417,9 +430,19 @@ def _choice(finding: Finding) -> dict[str, Any]:
 
 
 def part(finding: Finding) -> dict[str, Any]:
-    """Return where a part of a result comes from as JSON holds it; ``settings`` are those that chose it."""
-    settings = dict(finding.figures) if finding.source == "made up" else {}
-    return {"what": finding.about, "origin": finding.source, "how": sentence(finding), "settings": settings}
+    """Return where a part of a result comes from as JSON holds it; ``settings`` are those that chose it.
+
+    Programs make their own words of kind and figures.
+    """
+    figures = dict(finding.figures)
+    return {
+        "what": finding.about,
+        "origin": finding.source,
+        "how": sentence(finding),
+        "kind": finding.kind,
+        "figures": figures,
+        "settings": figures if finding.source == "made up" else {},
+    }
 
 
 def _rounded(figure: Any) -> Any:

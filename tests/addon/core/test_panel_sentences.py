@@ -68,6 +68,7 @@ def test_a_sentence(message, said) -> None:
 
 def test_frames_of_a_result_are_counted_on_from_the_clips() -> None:
     assert "frame 109 on" in sentence(finding("dissolving smoke", frame=70, room=8.0), before=39)
+    assert "In frames 40 to 42 the end" in sentence(finding("overlap of a loop", first=1, last=3), before=39)
 
 
 @pytest.mark.parametrize("kind", REMEDIES)

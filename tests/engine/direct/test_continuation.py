@@ -55,8 +55,10 @@ def test_a_continuation_keeps_the_frames_of_the_clip_and_adds_its_own(source, tm
     error = np.linalg.norm(made.density(15)[part] - true) / np.linalg.norm(true)
     held = np.linalg.norm(source.density(10) - true) / np.linalg.norm(true)
     assert error < 0.65 * held
-    assert made.provenance[-1]["origin"] == "made up"
-    assert "Frames 11 to 15" in made.provenance[-1]["how"]
+    said = made.provenance[-1]
+    assert (said["what"], said["origin"], said["kind"]) == ("continue", "made up", "simulated frames")
+    assert said["figures"] == {"frame": 10, "first": 11, "last": 15, "given": ""}
+    assert "Frames 11 to 15 are a simulation that starts from frame 10" in said["how"]
 
 
 def test_a_given_buoyancy_and_dissipation_count(source, tmp_path):

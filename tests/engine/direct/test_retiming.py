@@ -31,6 +31,7 @@ def test_a_sequence_at_half_its_speed(source, tmp_path):
     assert len(list(retime_sequence(source, tmp_path / "slow", (0.5,), npz=True, resume=True))) == 16
     slow = Sequence.open(tmp_path / "slow")
     assert slow.frames == tuple(range(1, 20))
+    assert (slow.provenance[-1]["what"], slow.provenance[-1]["kind"]) == ("retime", "interpolated frames")
     for number in source.frames:
         np.testing.assert_allclose(slow.density(2 * number - 1), source.density(number), rtol=1e-6)
         found, known = slow.velocity(2 * number - 1), source.velocity(number)
@@ -81,6 +82,7 @@ def test_a_loop_ends_where_it_begins(source, tmp_path):
     assert len(list(loop_sequence(source, tmp_path / "loop", 2, 10, 3, npz=True, resume=True))) == 4
     loop = Sequence.open(tmp_path / "loop")
     assert loop.frames == tuple(range(1, 7))
+    assert (loop.provenance[-1]["what"], loop.provenance[-1]["figures"]) == ("loop", {"first": 1, "last": 3})
     np.testing.assert_array_equal(loop.density(4), source.density(5))
     np.testing.assert_array_equal(loop.density(6), source.density(7))
     # the motion from the end to the start takes as long as the overlap and the step into it

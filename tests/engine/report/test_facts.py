@@ -76,6 +76,8 @@ def test_only_what_the_pictures_show_is_measured(shot) -> None:
     plain = [part(found) for found in provenance(shot)]
     assert json.loads(json.dumps(plain, allow_nan=False)) == plain
     assert [each["how"] for each in plain] == [sentence(found) for found in provenance(shot)]
+    assert [each["kind"] for each in plain] == [found.kind for found in provenance(shot)]
+    assert [bool(each["settings"]) for each in plain] == [False, False, False, True]
     plain = choices(shot.findings)
     assert json.loads(json.dumps(plain, allow_nan=False)) == plain
     assert all(each["by_hand"] or each["measured"] for each in plain)

@@ -183,9 +183,15 @@ def part(what: str, how: str = "", origin: str = "made up", **settings: float) -
     return {"what": what, "origin": origin, "how": how, "settings": settings}
 
 
-CONTINUED = "Frames {} to {} are a simulation that starts from frame {}, with 3 of the clip."
-LOOP = "In frames {} to {} the end of the loop becomes its start."
-CHAIN = [part("continue", CONTINUED), part("retime"), part("loop", LOOP.format(1, 3))]
+def directed(what: str, kind: str, **figures: int | str) -> dict[str, object]:
+    return {**part(what), "kind": kind, "figures": figures}
+
+
+OLD = "Frames 7 to 11 are a simulation that starts from frame 6."
+FRAMES_MADE = {"frame": 6, "first": 7, "last": 11}
+CONTINUED = directed("continue", "simulated frames", **FRAMES_MADE, given="")
+GIVEN = directed("continue", "simulated frames with given values", **FRAMES_MADE, given="buoyancy")
+CHAIN = [CONTINUED, part("retime", "All frames."), directed("loop", "overlap of a loop", first=1, last=3)]
 MADE = "degrees beside it. Made up: Depth Detail 0.5, Variation 3."
 
 
@@ -195,12 +201,19 @@ MADE = "degrees beside it. Made up: Depth Detail 0.5, Variation 3."
         ([part("velocity", origin="estimated"), part("detail", detail=0.5, seed=3)], MADE),
         ([part("velocity", origin="estimated")], "degrees beside it. Nothing is made up"),
         ([], ""),
-        ([part("continue", CONTINUED.format(7, 11, 6))], CONTINUED.format(46, 50, 45)),
-        (CHAIN, f"{LOOP.format(40, 42)} Before"),
+        ([CONTINUED], "Frames 46 to 50 are a simulation that starts from frame 45, with"),
+        ([GIVEN], "but with a given buoyancy."),
+        ([part("continue", OLD)], OLD),
+        (CHAIN[:2], "All frames. Before that: Continued."),
+        (CHAIN, "In frames 40 to 42 the end of the loop becomes its start"),
+        (CHAIN, "Before that: Continued, Retimed."),
     ],
 )
 def test_what_is_made_up_is_said(shot, tmp_path, parts, said) -> None:
-    """With the clip's frames; those of earlier results are not said of what was made of them."""
+    """With the clip's frames; those of earlier results are not said of what was made of them.
+
+    Results of earlier versions have a sentence alone.
+    """
     assert smoke(shot).data.get(volume.PROVENANCE, "") == ""
     take = made(tmp_path, used=[39, 44])
     with changed(take) as index:
@@ -208,7 +221,7 @@ def test_what_is_made_up_is_said(shot, tmp_path, parts, said) -> None:
     volume.show(smoke(shot), take)
     note = smoke(shot).data[volume.PROVENANCE]
     assert said in note and bool(note) == bool(parts)
-    assert ("simulation" in note) == (said.startswith("Frames"))
+    assert ("simulation" in note) == (len(parts) == 1 and parts[0]["what"] == "continue")
     volume.show(smoke(shot), made(tmp_path, number=2))
     assert smoke(shot).data.get(volume.PROVENANCE, "") == ""
 
