@@ -92,11 +92,11 @@ def directories_on_show() -> set[Path]:
 
 def scene_frame(smoke: bpy.types.Object, number: int) -> int:
     """The first frame of its scene in which a smoke shows a number of its take, without a live timing."""
-    first, steps = _pace(smoke)
+    first, steps = _frame_mapping(smoke)
     return smoke.data.frame_start + math.ceil((number - first) * steps - EARLY)
 
 
-def _pace(smoke: bpy.types.Object) -> tuple[int, float]:
+def _frame_mapping(smoke: bpy.types.Object) -> tuple[int, float]:
     """The first number of the take on show, and frames of the scene for each."""
     now = shown(smoke)
     return (now.numbers[0], _ratio(smoke, now) if _real_time(smoke, now) else 1.0) if now else (1, 1.0)
@@ -137,7 +137,7 @@ def go_to_smoke(smoke: bpy.types.Object) -> bool:
     smoky = [int(n) for n, figures in now.index["frames"].items() if figures.get("mass", 1.0) > 0.0] if now else []
     if not smoky:
         return False
-    first, steps = _pace(smoke)
+    first, steps = _frame_mapping(smoke)
     number = first + math.floor((scene.frame_current - smoke.data.frame_start + EARLY) / steps)
     if number not in smoky and not now.numbers[-1] < number <= _last_planned(now):
         scene.frame_set(scene_frame(smoke, min(smoky)))

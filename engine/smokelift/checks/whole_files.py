@@ -17,24 +17,24 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
     ``.NAME.PID.tmp`` may stay behind.
     """
     path = Path(path)
-    aside = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
-        yield aside
-        with aside.open("rb+") as file:  # else a power cut could leave the new name with nothing in it
+        yield temporary
+        with temporary.open("rb+") as file:  # else a power cut could leave the new name with nothing in it
             os.fsync(file.fileno())
-        aside.replace(path)
+        temporary.replace(path)
     except BaseException as error:
         with suppress(OSError):  # what failed before says why
-            aside.unlink()
-        if isinstance(error, OSError) and error.filename in (None, str(aside)):  # the name that was asked for
+            temporary.unlink()
+        if isinstance(error, OSError) and error.filename in (None, str(temporary)):  # the name that was asked for
             error.filename = str(path)
         raise
 
 
 def write_text(path: str | Path, text: str) -> None:
     """Write a text file in UTF-8, whole or not at all; OSError if that fails."""
-    with atomic_path(path) as aside:
-        aside.write_text(text, encoding="utf-8")
+    with atomic_path(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
 
 
 def read_text(path: Path) -> str:

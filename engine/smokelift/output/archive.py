@@ -44,7 +44,7 @@ def write_arrays(path: Path, arrays: Mapping[str, npt.NDArray[Any]], *, compress
     """Write arrays by name as a ``.npz``, one after the other: copies of all may not fit into memory."""
     kind = zipfile.ZIP_DEFLATED if compressed else zipfile.ZIP_STORED
     # not by NumPy, which an interrupt leaves with an open zip file that raises a second error when it is collected
-    with atomic_path(path) as aside, aside.open("wb") as file, zipfile.ZipFile(file, "w", kind) as archive:
+    with atomic_path(path) as temporary, temporary.open("wb") as file, zipfile.ZipFile(file, "w", kind) as archive:
         for name, values in arrays.items():
             with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
                 np.lib.format.write_array(member, np.asanyarray(values), allow_pickle=False)  # type: ignore[no-untyped-call]  # NumPy's

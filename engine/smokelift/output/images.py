@@ -64,15 +64,15 @@ def write_image(path: str | Path, image: npt.ArrayLike, *, half: bool = True) ->
             alpha = np.clip(values[..., 3:], 0, 1)
             straight = np.divide(values[..., :3], alpha, out=np.zeros_like(values[..., :3]), where=alpha > 0)
             codes = np.dstack([eight_bit(straight), np.asarray(np.rint(255 * alpha), np.uint8)])
-        with atomic_path(path) as aside:
-            Image.fromarray(codes).save(aside, format="PNG")
+        with atomic_path(path) as temporary:
+            Image.fromarray(codes).save(temporary, format="PNG")
     elif suffix == ".exr":
         limit = float(np.finfo(np.float16).max)
         pixels = np.clip(values, -limit, limit).astype(np.float16) if half else values
         header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
-        with atomic_path(path) as aside:
+        with atomic_path(path) as temporary:
             try:
-                OpenEXR.File(header, {"RGBA"[: values.shape[2]]: np.ascontiguousarray(pixels)}).write(str(aside))
+                OpenEXR.File(header, {"RGBA"[: values.shape[2]]: np.ascontiguousarray(pixels)}).write(str(temporary))
             except RuntimeError as error:
                 # OpenEXR tells of the system's errors in words only
                 number = next((each for each in DISK_FULL if os.strerror(each) in str(error)), errno.EIO)
@@ -97,14 +97,17 @@ def write_sheet(path: Path, rows: Sequence[Sequence[Tile]], titles: Sequence[str
         draw.text((GAP, top + 2), label, fill=(170, 170, 170))
         for tile, left in zip(tiles, lefts, strict=False):
             whole.paste(Image.fromarray(tile), (int(left), int(top) + _LINE))
-    with atomic_path(path) as aside:
-        whole.save(aside, format="PNG")
+    with atomic_path(path) as temporary:
+        whole.save(temporary, format="PNG")
 
 
 def write_video(path: Path, frames: Iterable[npt.NDArray[np.float32]], fps: float) -> None:
     """Write linear frames (rows, columns, 3) of one size; the suffix says which kind of `VIDEO_KINDS`."""
     container_format, codec = VIDEO_KINDS[path.suffix.lower()]
-    with atomic_path(path) as aside, av.open(f"file:{aside.absolute()}", "w", format=container_format) as container:
+    with (
+        atomic_path(path) as temporary,
+        av.open(f"file:{temporary.absolute()}", "w", format=container_format) as container,
+    ):
         stream: Any = None
         for frame in frames:
             picture = eight_bit(frame)

@@ -207,12 +207,12 @@ def write_vdb(
             grid.getAccessor().setActiveState(corner, True)
     if settings is not None:
         grids["density"][SETTINGS] = json.dumps(dict(settings), sort_keys=True)
-    with atomic_path(path) as aside:
+    with atomic_path(path) as temporary:
         try:
-            vdb.write(str(aside), grids=list(grids.values()))
+            vdb.write(str(temporary), grids=list(grids.values()))
         except RuntimeError as error:
             raise OSError(f"{path}: cannot be written: {error}") from error
-        _ensure_written(aside)
+        _ensure_written(temporary)
 
 
 def write_proxy(

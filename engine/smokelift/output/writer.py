@@ -178,8 +178,8 @@ class SequenceWriter:
             paths = [self._path(number, kind) for kind in self._kinds]
             for kind, path in zip(self._kinds, paths, strict=True):
                 if ready is not None and kind in ready:
-                    with atomic_path(path) as aside:
-                        shutil.copyfile(ready[kind], aside)
+                    with atomic_path(path) as temporary:
+                        shutil.copyfile(ready[kind], temporary)
                 elif kind == "vdb":
                     write_vdb(path, rho, velocity, box, self._index.settings, fire, lattice=self._domain)
                 else:

@@ -212,8 +212,8 @@ def write_page(path: Path, page: Page) -> None:
     if path.suffix.lower() == ".html":
         write_text(path, _as_html(page))
         return
-    with atomic_path(path) as aside:
-        _as_picture(page).save(aside, format="PNG", compress_level=PNG_COMPRESSION)
+    with atomic_path(path) as temporary:
+        _as_picture(page).save(temporary, format="PNG", compress_level=PNG_COMPRESSION)
 
 
 def tile_size(width: int, height: int) -> tuple[int, int]:

@@ -108,8 +108,8 @@ def write_toml(path: Path, data: Mapping[str, Any], comments: Sequence[str] = ()
     if path.is_dir():
         raise SceneError(f"{path}: is a folder; give the name of a file")
     top = "".join(f"# {printable(line)}\n" for line in listed(comments, str, "comments", "a list of lines"))
-    with atomic_path(path) as aside:
-        aside.write_text(top + tomli_w.dumps(data), encoding="utf-8")
+    with atomic_path(path) as temporary:
+        temporary.write_text(top + tomli_w.dumps(data), encoding="utf-8")
 
 
 def _find_lines(text: str) -> dict[Place, int]:

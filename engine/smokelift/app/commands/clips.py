@@ -136,8 +136,8 @@ def _write_thumbnail(path: Path, shot: Shot, frame: pipeline.Frame) -> None:
     found = shot.optics.renderer(seen.camera, seen.clean_plate.image).image(frame.density)
     rows, columns = seen.image.shape[:2]
     both = np.concatenate([seen.image, found], 0 if columns > rows else 1)
-    with atomic_path(path) as aside:
-        Image.fromarray(eight_bit(both)).save(aside, format="PNG")
+    with atomic_path(path) as temporary:
+        Image.fromarray(eight_bit(both)).save(temporary, format="PNG")
 
 
 def add_extract_options(parser: argparse.ArgumentParser) -> None:
