@@ -2,7 +2,9 @@
 
 A voxel is enclosed if the surface winds around it. That is counted along the columns of voxels of each axis; a column
 in which the crossings do not balance passes through a hole of the surface and says nothing, and the others decide by
-majority. So parts may overlap, and a few holes do no harm (after Nooruddin and Turk 2003).
+majority. So parts may overlap, and a few holes do no harm (after Nooruddin and Turk 2003). OpenVDB's own voxelizer
+finds the same voxels of a closed surface in as much time, but no Python 3.12 has it, and the crossings are needed for
+the speed of moving faces.
 """
 
 import hashlib
