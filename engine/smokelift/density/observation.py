@@ -48,10 +48,11 @@ MIN_CONTRAST = 0.1
 """Contrast of the background to the source radiance in shadow, over that without shadows, below which the latter tells
 more: in deep shadow noise would be taken for smoke."""
 
-WHITE = 1.5
+WHITE, WHITE_IN_ASSUMED_LIGHT = 1.5, 6.0
 """Brightness of the white that T is shown over, over that of the plate or of what the smoke sends, whichever is
 brighter: with half of it smoke of the plate's own brightness is not fitted, with twice of it errors of T are fitted
-rather than the picture (docs/experiments/extraction.md)."""
+rather than the picture. In an assumed light the errors of what the smoke sends are several times as large, and with a
+dimmer white its shaded side is fitted as a hole (docs/experiments/extraction.md)."""
 
 USEFUL_DEVIATION = 0.4
 """Deviation of T beyond which it shows little: smoke is clear air or not, by one and a half of it to either side."""
@@ -92,6 +93,8 @@ class Observation:
         the noise of 8 bits (`clean_plate`), and in `reconstruct_density` for the scene's background.
     element
         The smoke without the plate; None where the picture itself tells as much, as before black or one color.
+    light_assumed
+        Whether nothing is known of the light, so that T tells more of the smoke than what it sends.
 
     Raises
     ------
@@ -103,6 +106,7 @@ class Observation:
     image: Image
     plate: Plate | None = None
     element: Element | None = None
+    light_assumed: bool = False
 
     def __post_init__(self) -> None:
         require_kind(self.camera, Camera, "camera", "a Camera")
@@ -183,7 +187,7 @@ class ObservedView:
             image, background, noise = observation.image, plate.image, noise_at(observation.image, plate)
             left_out = np.zeros_like(image)
         else:
-            image, background, noise = _over_one_color(observation.element, observation.image, plate)
+            image, background, noise = _over_one_color(observation, observation.element, plate)
             left_out = observation.image - observation.element.over(plate.image)
             probability = np.maximum(probability, _faint_smoke(observation.element, probability == 0))
         image = background + probability[..., None] * (image - background)
@@ -323,7 +327,7 @@ def _faint_smoke(element: Element, clear: Mask) -> Array:
     return certainty(opacity / np.float32(noise), OPACITY_WIDTH, element.shared / np.float32(noise))
 
 
-def _over_one_color(element: Element, picture: Image, plate: Plate) -> tuple[Image, Image, Image]:
+def _over_one_color(observation: Observation, element: Element, plate: Plate) -> tuple[Image, Image, Image]:
     """An element, its background and its noise in four channels: over the plate's mean color, and T over a white.
 
     So a fit asks for S + T B, which the picture shows best, before a plate without detail, and for T. The white is as
@@ -334,8 +338,9 @@ def _over_one_color(element: Element, picture: Image, plate: Plate) -> tuple[Ima
     color = np.average(plate.image, axis=(0, 1), weights=known)
     opacity = 1 - element.transmittance
     sent = float((opacity * channel_mean(element.radiance)).sum()) / max(float(opacity.sum()), MIN_WEIGHT)
-    white = WHITE * max(sent, float(color.mean())) / np.hypot(1, element.deviation / USEFUL_DEVIATION)
-    noise = noise_at(picture, plate)
+    brightness = (WHITE_IN_ASSUMED_LIGHT if observation.light_assumed else WHITE) * max(sent, float(color.mean()))
+    white = brightness / np.hypot(1, element.deviation / USEFUL_DEVIATION)
+    noise = noise_at(observation.image, plate)
     image = np.dstack([element.over(color), white * element.transmittance])
     background = np.dstack([np.broadcast_to(color, noise.shape), white])
     return image.astype(np.float32), background.astype(np.float32), np.dstack([noise, noise.mean(-1)])

@@ -56,7 +56,7 @@ def open_views(
     views: list[ShotView] = []
     found: list[Finding] = []
     for number in range(len(scene.views)):
-        view, noticed = _open_view(number, first.clip, scene)
+        view, noticed = _open_view(number, first.clip, scene, not lit)
         found += noticed
         if settings.measure and scene.scattering != "absorption":
             view, gain = _match_exposure(number + 1, first, view, scene, numbers, lit, settings)
@@ -75,7 +75,7 @@ def disagreement(shot: Shot) -> list[Finding]:
     return [] if agreed >= MIN_AGREED_FRACTION else [Finding("disagreeing views", {"agreed": agreed}, doubt=True)]
 
 
-def _open_view(number: int, clip: Clip, scene: CompleteScene) -> tuple[ShotView, list[Finding]]:
+def _open_view(number: int, clip: Clip, scene: CompleteScene, light_assumed: bool) -> tuple[ShotView, list[Finding]]:
     """A further view of a scene, from 0, with its background; and what was found of it."""
     view = scene.views[number]
     view_clip = _open_clip(view.clip, clip, scene)
@@ -90,7 +90,7 @@ def _open_view(number: int, clip: Clip, scene: CompleteScene) -> tuple[ShotView,
     found = find_background(view_clip, camera, background)
     plate, source, _ = with_source(found, found.clip, sample_smoke(found.clip, found.plate))
     try:
-        shown = ShotView.facing(scene.domain, found.clip, camera, plate, source)
+        shown = ShotView.facing(scene.domain, found.clip, camera, plate, source, light_assumed)
     except ValueError as error:
         raise ValueError(f"View {number + 1}: {error}") from error
     axes = [np.array(each.matrix)[:3, 2] for each in (scene.camera, camera)]

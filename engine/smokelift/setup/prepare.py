@@ -69,7 +69,7 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
         inlets=scene.inlets,
     )
     source = _source_in_light(estimate, complete) if scene.lights else estimate.source
-    first = ShotView.facing(domain, estimate.clip, camera, estimate.plate, source)
+    first = ShotView.facing(domain, estimate.clip, camera, estimate.plate, source, not scene.lights)
     complete, of_scattering = _with_scattering(complete, asked, first, estimate, bool(of_light), settings)
     if complete.scattering == "absorption":
         of_light = [found for found in of_light if found.about != "source radiance"]

@@ -22,6 +22,7 @@ class ShotView:
     Frame 0 of ``clip`` is of the same moment as the input's. The grid is fitted to the small picture ``working``; for a
     camera that moves it is that of the first frame that shows the domain. ``source`` (3,) is the usual source radiance
     of the smoke before a picture that shows its transmittance; then it is extracted. None before any other.
+    ``light_assumed`` is whether the scene's lights are not given.
     """
 
     clip: Clip
@@ -29,13 +30,16 @@ class ShotView:
     plate: Plate
     working: WorkingPicture
     source: Image | None = None
+    light_assumed: bool = False
 
     @staticmethod
-    def facing(domain: Domain, clip: Clip, camera: Camera, plate: Plate, source: Image | None) -> "ShotView":
+    def facing(
+        domain: Domain, clip: Clip, camera: Camera, plate: Plate, source: Image | None, light_assumed: bool = False
+    ) -> "ShotView":
         """Return a camera's view of a domain; ValueError if no frame shows it."""
         for frame in range(len(camera.matrices) or 1):
             if (working := working_picture(camera.at(frame), domain)) is not None:
-                return ShotView(clip, camera, plate, working, source)
+                return ShotView(clip, camera, plate, working, source, light_assumed)
         raise ValueError("The camera does not see the domain; move the domain into the picture or turn the camera.")
 
     def observe(self, frame: int, domain: Domain) -> Observation | None:
@@ -48,7 +52,7 @@ class ShotView:
         else:
             plate = self._plate_of_working_picture.at(frame)
         image = working.of(self.clip, frame)
-        return Observation(working.camera, image, plate, self.element(frame, working))
+        return Observation(working.camera, image, plate, self.element(frame, working), self.light_assumed)
 
     def element(self, frame: int, working: WorkingPicture) -> Element | None:
         """The smoke of a frame, from 0, without the plate, as a small picture; None where ``source`` is."""

@@ -70,6 +70,22 @@ def test_an_element_is_seen_over_one_color_and_a_white(small, wall, element) -> 
     assert (view.optical_depth[~view.mask] == 0).all()
 
 
+def test_a_shaded_side_is_no_hole_in_an_assumed_light(small, wall, element) -> None:
+    """The clip's light comes from the right, of which the scene's knows nothing: there the transmittance tells more."""
+    dark = np.linspace(0, 2, element.radiance.shape[1], dtype=np.float32)[None, :, None]
+    shaded = replace(element, radiance=dark * element.radiance)
+    left, errors = np.s_[:, :15], {}
+    for assumed in (False, True):
+        picture, plate = shaded.over(wall), eight_bit_plate(wall, small.camera.size)
+        observation = Observation(small.camera, picture, plate, shaded, light_assumed=assumed)
+        views = ViewSet.of([observation], scene_optics(completed(small)))
+        density = GradientFit(QUICK).fit(views, RoundDepth().estimate(views), None).density
+        renderer = scene_renderer(completed(small))
+        renderer.image(density)
+        errors[assumed] = np.abs(renderer.transmittance - element.transmittance)[left].mean()
+    assert errors[True] < 0.5 * errors[False]
+
+
 def test_the_color_of_an_element_is_that_of_the_known_plate(small, wall, element) -> None:
     """What is filled in under the smoke counts for nothing beside what is seen."""
     confidence, wrong = np.ones((42, 30), np.float32), wall.copy()

@@ -192,6 +192,7 @@ def test_a_clip_without_smoke_gives_a_shot(plume, draft, tmp_path, complete) -> 
     scene = plume.write(tmp_path / "clip", [np.zeros_like(plume.densities[0])] * 3)
     shot = shot_of(replace(scene, lights=(), medium=None) if complete else bare(scene), draft)
     assert np.isfinite(shot.scene.lights[0].irradiance).all()
+    assert shot.views[0].light_assumed and not shot_of(scene, draft).views[0].light_assumed
 
 
 def test_the_velocity_grid_is_as_coarse_as_the_depth_is_unknown(plume, draft) -> None:
