@@ -5,14 +5,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from smokelift.extraction.hidden_plate import SIDE, SomeFrames, in_turn, is_known, likeliest_plate, plate_and_source
+from smokelift.extraction import hidden_plate
+from smokelift.extraction.hidden_plate import SomeFrames, in_turn, is_known, likeliest_plate, plate_and_source
 from smokelift.extraction.plate import Plate
 from smokelift.footage.images import Picture, area_average, blurred
 from smokelift.footage.noise import EIGHT_BIT_NOISE
 
-COLUMNS, ROWS, FRAMES = 192, 160, 5
+COLUMNS, ROWS, FRAMES, SIDE = 128, 106, 5, 64
 SOURCE = np.array([0.6, 0.58, 0.55], np.float32)
-X, Y = np.meshgrid(np.arange(COLUMNS), np.arange(ROWS))
+X, Y = np.meshgrid(np.arange(0, 192, 1.5), np.arange(0, 159, 1.5))
+
+
+@pytest.fixture(autouse=True)
+def few_cells(monkeypatch) -> None:
+    """Of two pixels along a side."""
+    monkeypatch.setattr(hidden_plate, "SIDE", SIDE)
 
 
 class Pictures:
@@ -92,7 +99,7 @@ def test_what_no_mixture_with_the_continuation_explains_is_the_plate() -> None:
 def test_a_post_goes_on_behind_smoke_from_above_and_below() -> None:
     """A bright post before a dark sky, which is what lies on its sides."""
     behind = np.full((ROWS, COLUMNS, 3), 0.03, "f4") * (1 + 0.2 * wall() / wall().mean())
-    behind[:, 88:104] = 0.5, 0.4, 0.25
+    behind[abs(X - 96) < 12] = 0.5, 0.4, 0.25
     plate = replace(continued(behind), errors=0.01 * np.eye(3, dtype="f4"))
     plate.image[plate.confidence < 0.5] = 0.03
     better = after_turns(filmed(behind, list(np.linspace(70, 122, FRAMES)), 3.0), plate, SOURCE)
@@ -112,7 +119,7 @@ def test_detail_is_that_of_frames_that_show_most_of_it() -> None:
 
 def test_detail_of_smoke_is_not_that_of_a_smooth_wall() -> None:
     """Billows that stay within the middle, before a wall that has none wherever it is seen."""
-    behind = np.repeat((0.05 + 0.5 * X / COLUMNS)[..., None], 3, 2).astype("f4")
+    behind = np.repeat((0.05 + 0.5 * X / 192)[..., None], 3, 2).astype("f4")
     plate = replace(continued(behind), image=behind + (1 - continued(behind).confidence)[..., None] * 0.05)
     pictures = []
     for seed in range(FRAMES):
@@ -162,7 +169,7 @@ def test_a_plate_without_errors_is_known(change) -> None:
 def test_what_moves_is_where_the_frames_in_use_show_it() -> None:
     """A post that stood before the middle until a second before the last two frames, in which smoke is thin."""
     behind, post = wall(), wall()
-    post[:, 84:108] *= np.array([0.2, 0.3, 1.5], "f4")
+    post[abs(X - 96) < 12] *= np.array([0.2, 0.3, 1.5], "f4")
     centers = list(np.linspace(40, 152, FRAMES))
     clip = filmed(post, centers, 0.7)
     clip.fps, clip.pictures[-2:] = 1.0, filmed(behind, centers[-2:], 0.7).pictures
