@@ -106,7 +106,7 @@ def test_an_estimate_on_a_coarser_grid_guides_the_next_one() -> None:
 def test_units_do_not_matter(estimator):
     before, after, _ = translation((0.4, 0.2, 0.6))
     reference = estimator.estimate(DensityPair(before, after, DT, VOXEL)).centres()
-    for density, length, time in ((0.01, 1, 1), (100, 1, 1), (1, 100, 1), (1, 1, 10)):
+    for density, length, time in ((0.01, 1, 10), (100, 100, 1)):
         other = estimator.estimate(DensityPair(density * before, density * after, time * DT, length * VOXEL)).centres()
         assert np.linalg.norm(other * (time / length) - reference) < 0.01 * np.linalg.norm(reference)
 
