@@ -15,7 +15,7 @@ import smokelift._core as _core
 from smokelift.checks import Array, Doubles, Mask, radiance, require_kind
 from smokelift.density.hull import Projection, common_hull, project_voxels, reached
 from smokelift.density.upright_plane import AxisEstimate
-from smokelift.extraction.element import Element
+from smokelift.extraction.element import BRIGHTNESS_RANGE, Element
 from smokelift.extraction.matte import certainty, matte
 from smokelift.extraction.plate import Plate, noise_at
 from smokelift.footage.images import area_average, channel_mean
@@ -53,6 +53,10 @@ WHITE, WHITE_IN_ASSUMED_LIGHT = 1.5, 6.0
 brighter: with half of it smoke of the plate's own brightness is not fitted, with twice of it errors of T are fitted
 rather than the picture. In an assumed light the errors of what the smoke sends are several times as large, and with a
 dimmer white its shaded side is fitted as a hole (docs/experiments/extraction.md)."""
+
+MIN_SENT = 0.1
+"""Radiance over the brightness of smoke or plate below which what an element sends counts as none: hair before a wall,
+taken for smoke, sends none, smoke in shadow .2 of the usual or more (measured on a plume)."""
 
 USEFUL_DEVIATION = 0.4
 """Deviation of T beyond which it shows little: smoke is clear air or not, by one and a half of it to either side."""
@@ -331,15 +335,22 @@ def _over_one_color(observation: Observation, element: Element, plate: Plate) ->
     """An element, its background and its noise in four channels: over the plate's mean color, and T over a white.
 
     So a fit asks for S + T B, which the picture shows best, before a plate without detail, and for T. The white is as
-    bright beside the plate and the smoke as `WHITE` says. Errors of T are no noise, whatever their size: they do not
-    end a fit.
+    bright beside the plate and the smoke as `WHITE` says, less where T is uncertain, and where the light is assumed
+    less where S is unlike what that much smoke usually sends: that may be a person. Errors of T are no noise, whatever
+    their size: they do not end a fit.
     """
     known = np.broadcast_to(plate.confidence[..., None] + MIN_WEIGHT, plate.image.shape)
     color = np.average(plate.image, axis=(0, 1), weights=known)
-    opacity = 1 - element.transmittance
-    sent = float((opacity * channel_mean(element.radiance)).sum()) / max(float(opacity.sum()), MIN_WEIGHT)
-    brightness = (WHITE_IN_ASSUMED_LIGHT if observation.light_assumed else WHITE) * max(sent, float(color.mean()))
-    white = brightness / np.hypot(1, element.deviation / USEFUL_DEVIATION)
+    opacity, sent = 1 - element.transmittance, np.maximum(channel_mean(element.radiance), 0)
+    brightness = max(float((opacity * sent).sum()) / max(float(opacity.sum()), MIN_WEIGHT), float(color.mean()))
+    useful = np.hypot(1, element.deviation / USEFUL_DEVIATION)
+    if observation.light_assumed:
+        usual = opacity * (float(sent.sum()) / max(float(opacity.sum()), MIN_WEIGHT))
+        least = MIN_SENT * brightness
+        unlike = np.log((sent + least) / (usual + least)) / (2 * BRIGHTNESS_RANGE)
+        white = WHITE_IN_ASSUMED_LIGHT * brightness / np.hypot(useful, unlike)
+    else:
+        white = WHITE * brightness / useful
     noise = noise_at(observation.image, plate)
     image = np.dstack([element.over(color), white * element.transmittance])
     background = np.dstack([np.broadcast_to(color, noise.shape), white])

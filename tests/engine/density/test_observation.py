@@ -86,6 +86,21 @@ def test_a_shaded_side_is_no_hole_in_an_assumed_light(small, wall, element) -> N
     assert errors[True] < 0.5 * errors[False]
 
 
+def test_what_sends_no_light_tells_less_of_smoke_in_an_assumed_light(small, wall, element) -> None:
+    """It may be hair before the wall; with the light known, smoke there would send none either."""
+    hair = np.s_[4:8, 4:8]
+    radiance, clear = element.radiance.copy(), element.transmittance.copy()
+    radiance[hair], clear[hair] = 0, 0.1
+    person, plate = replace(element, radiance=radiance, transmittance=clear), eight_bit_plate(wall, small.camera.size)
+    whites = {}
+    for assumed in (False, True):
+        observation = Observation(small.camera, person.over(wall), plate, person, light_assumed=assumed)
+        whites[assumed] = ObservedView.of(observation, scene_optics(completed(small))).background[..., 3]
+    smoky = element.transmittance < 0.5
+    assert np.ptp(whites[False]) < 1e-3 * whites[False].max()
+    assert whites[True][hair].max() < 0.6 * np.median(whites[True][smoky])
+
+
 def test_the_color_of_an_element_is_that_of_the_known_plate(small, wall, element) -> None:
     """What is filled in under the smoke counts for nothing beside what is seen."""
     confidence, wrong = np.ones((42, 30), np.float32), wall.copy()
