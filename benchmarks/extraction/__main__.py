@@ -6,7 +6,8 @@
 A SCENE is a folder with truth.npz and what `benchmarks.truth.picture` makes of it. A plate is one of `plates.PAINTED`
 or `plates.PHOTOGRAPHS` (which are files of scikit-image), or the path of a picture. Of the plate a scene file knows the
 picture (given), a frame of the clip without smoke (frame), or nothing (unknown); without any of them the clips
-are only composed. Camera, box, medium and lights are given. With --black the same smoke before black follows, from
+are only composed. Camera, box, medium and lights are given; with --relit the latter two are not, and what is found is
+shown in the true ones. With --black the same smoke before black follows, from
 which nothing has to be separated.
 
 OUT/SCENE-PLATE gets what `compose.compose` writes. Rows are printed and added to OUT/rows.csv; what is there already is
@@ -17,7 +18,10 @@ inside the smoke at the clip's pixels, PSNR of new views at 20, 45 and 90 degree
 
 import argparse
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
+
+import numpy as np
 
 from benchmarks.baked import Baked
 from benchmarks.extraction.compose import CRF, GIVEN, KNOWN, Composed, Filming, compose, folder_name
@@ -26,7 +30,7 @@ from benchmarks.measure import Figures, reconstructed
 from benchmarks.plates import PAINTED, PHOTOGRAPHS, plate_name
 from benchmarks.tables import Rows, cell, line, markdown, sizes_of
 from smokelift import Clip, Frame, Scene, Settings
-from smokelift.scene import CompleteScene
+from smokelift.scene import CompleteScene, completed
 from smokelift.setup.settings import QUALITIES
 
 RESOLUTION = "48x48x72"
@@ -62,6 +66,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--crf", type=int, default=CRF, help="of H.264")
     parser.add_argument("--noise", type=float, default=0.0, help="per cent of the range of sRGB values")
     parser.add_argument("--drift", action="store_true", help="exposure and white balance drift")
+    parser.add_argument("--relit", action="store_true", help="give no lights and medium, and score in the true ones")
     options = parser.parse_args(arguments)
     filming = Filming(options.crf, options.noise / 100, options.drift)
     settings = Settings.preset(options.quality, resolution=sizes_of(options.resolution)[0])
@@ -75,24 +80,35 @@ def main(arguments: Sequence[str] | None = None) -> None:
         for plate in options.plates:
             compose(smoke, plate, filming, options.out / folder_name(smoke.name, plate, filming))
         for plate, known in wanted:
-            about = (smoke.name, plate_name(plate) + filming.name, known)
+            about = (smoke.name, plate_name(plate) + filming.name, known + ("-relit" if options.relit else ""))
             key = (*about, options.quality, options.resolution)
             if (figures := rows.find(key)) is None:
                 folder = options.out / folder_name(smoke.name, plate, filming)
-                figures = measured(smoke, compose(smoke, plate, filming, folder), folder / f"{known}.toml", settings)
+                figures = measured(
+                    smoke, compose(smoke, plate, filming, folder), folder / f"{known}.toml", settings, options.relit
+                )
                 if "refused" not in figures:  # the next state of the code may not refuse
                     rows.add(key, figures)
                     figures = rows.find(key) or figures  # as rounded as they are when they are read again
             print(line([*about, *cells(figures)]), flush=True)
 
 
-def measured(smoke: Baked, composed: Composed, path: Path, settings: Settings) -> Figures:
-    """Reconstruct a scene file, and return its figures, or the sentence in which the engine refuses."""
+def measured(smoke: Baked, composed: Composed, path: Path, settings: Settings, relit: bool = False) -> Figures:
+    """Reconstruct a scene file, and return its figures, or the sentence in which the engine refuses.
+
+    If it is ``relit`` the file's lights and medium are not used, and the true ones show what is found.
+    """
+    true = completed(smoke.scene)
 
     def score(scene: CompleteScene, frames: list[Frame]) -> Figures:
-        return score_densities(scene, lambda number: frames[number].density, smoke, composed)
+        scale = np.float32(scene.medium.extinction / true.medium.extinction if relit else 1)
+        if relit:
+            scene = replace(scene, medium=true.medium, lights=true.lights, scattering=true.scattering)
+        return score_densities(scene, lambda number: scale * frames[number].density, smoke, composed)
 
     described = Scene.load(path)
+    if relit:
+        described = replace(described, lights=(), medium=None, scattering=None)
     assert described.clip is not None
     with Clip.open(described.clip) as clip:
         return reconstructed(clip, described, settings, score)

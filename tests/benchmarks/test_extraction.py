@@ -116,12 +116,13 @@ def test_the_true_volumes_score_as_the_truth(smoke, composed) -> None:
     assert dark["psnr_90"] < 40
 
 
-def test_the_command_measures_once(folder, tmp_path, capsys) -> None:
+@pytest.mark.parametrize(("relit", "known"), [([], "given"), (["--relit"], "given-relit")])
+def test_the_command_measures_once(folder, tmp_path, capsys, relit, known) -> None:
     command = [str(tmp_path), str(folder), "--plates", "sky", "--known", GIVEN, "--frames", "3"]
-    command += ["--quality", "draft", "--resolution", "16x16x24"]
+    command += ["--quality", "draft", "--resolution", "16x16x24", *relit]
     main(command)
     first = capsys.readouterr().out.splitlines()[-1]
-    assert first.startswith(f"| {folder.name} | sky | given |")
+    assert first.startswith(f"| {folder.name} | sky | {known} |")
     (tmp_path / f"{folder.name}-sky" / "clip.mp4").unlink()
     main(command)
     assert capsys.readouterr().out.splitlines()[-1] == first
