@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import smokelift._core as _core
+from smokelift.extraction.matte import matte
 from smokelift.extraction.plate import Plate, noise_at, resized
 from smokelift.footage.images import Picture, area_average, blurred, channel_mean, linear_to_srgb, reduced_size
 from smokelift.footage.noise import linear_per_srgb
@@ -155,6 +156,22 @@ def extract_element(picture: Picture, plate: Plate, source: Picture, size: tuple
     noise += np.square(MODEL_ERROR * passed).mean(-1)
     fine_weight = np.asarray(weight * own / np.maximum(own + noise, MIN_VARIANCE), np.float32)
     return Element(smooth + fine_weight[..., None] * (small - passed - smooth), clear, deviation, shared, weight)
+
+
+def evenly_lit_element(picture: Picture, plate: Plate, source: Picture) -> Element:
+    """Return the smoke of a linear picture (rows, columns, 3) before a plate that does not show its transmittance.
+
+    Any T explains such a picture. By convention it is that of smoke which sends ``source`` (3,) wherever it is opaque,
+    unless S would be negative with it. T is 1 where no smoke is seen.
+    """
+    seen = matte(picture, plate).probability[..., None] * (picture - plate.image)
+    contrast = source - plate.image
+    opacity = np.sum(seen * contrast, -1) / np.maximum(np.sum(contrast * contrast, -1), MIN_VARIANCE)
+    darkened = np.max(-seen / np.maximum(plate.image, MIN_VARIANCE), -1)
+    opacity = np.clip(np.maximum(opacity, darkened), 0, 1).astype(np.float32)
+    none, all_of_it = np.zeros_like(opacity), np.ones_like(opacity)
+    radiance = np.maximum(seen + opacity[..., None] * plate.image, 0)
+    return Element(radiance, 1 - opacity, all_of_it, none, all_of_it)
 
 
 def source_of(fields: Picture, source: Picture) -> Picture:

@@ -4,17 +4,18 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from smokelift.checks import require_kind
-from smokelift.extraction.element import Element, extract_element
-from smokelift.extraction.find_background import find_background
-from smokelift.extraction.hidden_plate import plate_and_source
-from smokelift.extraction.plate import Plate, cleared
+import numpy as np
+
+from smokelift.checks import Finding, require_kind
+from smokelift.extraction.element import Element, evenly_lit_element, extract_element
+from smokelift.extraction.plate import Plate
 from smokelift.footage.clip import Clip
 from smokelift.footage.frame_source import is_pattern
 from smokelift.footage.images import Picture
 from smokelift.output.images import write_image
 from smokelift.scene import Scene
-from smokelift.setup.first_estimate import sample_smoke
+from smokelift.setup.first_estimate import burning_smoke, first_findings, is_given
+from smokelift.setup.illumination import source_radiance
 
 PATTERN = "element_####.exr"
 """Names of the pictures in a directory."""
@@ -37,11 +38,18 @@ class Extraction:
         What is behind the smoke.
     source : (3,)
         The smoke's usual source radiance.
+    measured
+        Whether what is behind the smoke shows its transmittance. Black and the smoke's own color do not: there the
+        smoke is taken to be evenly lit, and the thickest opaque.
+    findings
+        What was measured, assumed and noticed of the clip and what is behind the smoke, with the doubts.
     """
 
     clip: Clip
     behind: Plate
     source: Picture
+    measured: bool = True
+    findings: tuple[Finding, ...] = ()
 
     @property
     def plate(self) -> Picture:
@@ -56,7 +64,10 @@ class Extraction:
 
     def element(self, frame: int) -> Element:
         """Return the element of a frame, counted from 0."""
-        return extract_element(self.clip.frame(frame), self.behind.at(frame), self.source, self.clip.size)
+        picture, plate = self.clip.frame(frame), self.behind.at(frame)
+        if self.measured:
+            return extract_element(picture, plate, self.source, self.clip.size)
+        return evenly_lit_element(picture, plate, self.source)
 
     def write(self, path: str | Path) -> Iterator[Path]:
         """Write the elements as premultiplied linear RGBA (EXR, half) or straight sRGB (PNG, 8 bit); yield each file.
@@ -122,7 +133,12 @@ def extract(clip: Clip, scene: Scene) -> Extraction:
     """
     require_kind(clip, Clip, "clip", 'a Clip (Clip.open("clip.mp4") opens one)')
     require_kind(scene, Scene, "scene", "a Scene (Scene() leaves all open, Scene.load reads a file)")
-    found = find_background(clip, scene.camera, scene.background)
-    smoky = sample_smoke(found.clip, found.plate).smoky or range(len(clip))
-    plate, source = plate_and_source(found.clip, found.uncut_clip(found.clip), found.plate, smoky)
-    return Extraction(cleared(found.clip, plate), plate, source)
+    estimate = burning_smoke(clip, scene.camera, scene.background)
+    findings = [*clip.findings(), *first_findings(estimate, is_given(scene.background, estimate.found))]
+    source, measured = estimate.source, estimate.source is not None
+    if source is None:
+        source = source_radiance(estimate.samples).astype(np.float32)
+        findings += [Finding("alpha of evenly lit smoke", about="alpha", source="assumed")] * bool(
+            estimate.samples.smoky
+        )
+    return Extraction(estimate.clip, estimate.plate, source, measured, tuple(findings))

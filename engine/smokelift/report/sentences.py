@@ -130,6 +130,10 @@ SENTENCES: Mapping[str, str] = {
         "Only bars beside the picture never change, so everything between them counts as smoke. Crop the bars off, or "
         "give a clean plate as background."
     ),
+    "alpha of evenly lit smoke": (
+        "What is behind the smoke does not show how much of it the smoke hides, so alpha is a convention: that of "
+        "evenly lit smoke whose thickest part is opaque."
+    ),
     "no smoke examined": "No smoke found in {frames:examined frame}, so nothing about it could be measured.",
     "no smoke before the given background": (
         "The background that is given may hold the smoke, or belong to another clip: check it."

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.checks import Finding
+from smokelift.density.observation import MAX_DARK_RADIANCE
 from smokelift.extraction.element import shows_transmittance
 from smokelift.extraction.find_background import FoundBackground, find_background
 from smokelift.extraction.given_background import single_color
@@ -158,22 +159,37 @@ def first_estimate(
     return FirstEstimate(clip, found, plate, samples, fire, hot, source)
 
 
+def burning_smoke(clip: Clip, camera: Camera | None, background: Background | None) -> FirstEstimate:
+    """Estimate what a clip shows as `first_estimate` does, but for fire: its light is left in the smoke's.
+
+    One color counts as showing T where its hue is not the smoke's.
+    """
+    found = find_background(clip, camera, background)
+    samples = sample_smoke(found.clip, found.plate)
+    hot = hot_pixels(samples.colors, samples.behind)
+    plate, source, samples = with_source(found, found.clip, samples, by_hue=True)
+    return FirstEstimate(cleared(found.clip, plate), found, plate, samples, None, hot, source)
+
+
 def with_source(
-    found: FoundBackground, clip: Clip, samples: SmokeSamples
+    found: FoundBackground, clip: Clip, samples: SmokeSamples, *, by_hue: bool = False
 ) -> tuple[Plate, Picture | None, SmokeSamples]:
     """Return the plate of a clip, found in turn with its smoke, the usual source radiance (3,) of that, and samples.
 
     There is none before what does not show T: black, one color, or a given picture as good as one; and without smoke.
+    A fit does as well with the picture itself before one color; ``by_hue`` asks whether its hue shows T, unless dark.
     ``samples`` are those before the plate as it was found.
     """
     if not samples.smoky:
         return found.plate, None, samples
     # a wall that was found is no even color, however little its light changes
     shown = visible_plate(found.plate, clip, samples.smoky[0])
-    if found.source != "picture" and single_color(shown) is not None:
+    color = None if found.source == "picture" else single_color(shown)
+    if color is not None and not by_hue:
         return found.plate, None, samples
     plate, source = plate_and_source(clip, found.uncut_clip(clip), found.plate, samples.smoky)
-    if not shows_transmittance(visible_plate(plate, clip, samples.smoky[0]), source):
+    dark = color is not None and color.max() <= MAX_DARK_RADIANCE * source.mean()
+    if dark or not shows_transmittance(visible_plate(plate, clip, samples.smoky[0]), source):
         return found.plate, None, samples
     if plate is not found.plate:
         # what no frame shows clear is unknown, although turns say what is behind it
@@ -225,7 +241,7 @@ def sample_smoke(clip: Clip, plate: Plate) -> SmokeSamples:
 
 def first_findings(estimate: FirstEstimate, given: bool) -> list[Finding]:
     """Return what was assumed or noticed of a clip and its background, which may be ``given``; with the doubts."""
-    found, samples, hot = estimate.found, estimate.samples, estimate.hot
+    found, samples = estimate.found, estimate.samples
     said = background_findings(found, not given and _between_bars(samples))
     if found.source == "alpha" and given:
         said.append(Finding("background unused"))
@@ -234,9 +250,13 @@ def first_findings(estimate: FirstEstimate, given: bool) -> list[Finding]:
         said.append(Finding("clearest frame", {"frame": found.clip.numbers[samples.clearest]}))
     if samples.exposure:
         said.append(Finding("exposure", {"change": samples.exposure}, about="exposure", source="measured"))
-    if estimate.fire is None and hot.may_burn:
-        said.append(Finding("possible fire", {"fraction": hot.fraction, "bright": hot.bright}, doubt=True))
     return said
+
+
+def is_given(background: Background | None, found: FoundBackground) -> bool:
+    """Whether a scene says what is behind the smoke: an alpha channel leaves only strokes to be given in vain."""
+    # with an alpha channel, which leaves no background to estimate, strokes alone count as a given one
+    return background is not None and (not background.estimated or found.source == "alpha")
 
 
 def background_findings(found: FoundBackground, bars: bool = False) -> list[Finding]:

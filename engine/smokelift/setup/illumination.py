@@ -107,6 +107,9 @@ def find_medium(scene: Scene, estimate: FirstEstimate, camera: Camera, domain: D
         figures = {"fraction": fraction, "red": red, "green": green, "blue": blue}
         found.append(Finding("fire", figures, about="fire", value=fraction, source="measured"))
         medium = replace(medium, flame_color=fire.color)
+    elif estimate.hot.may_burn:
+        figures = {"fraction": estimate.hot.fraction, "bright": estimate.hot.bright}
+        found.append(Finding("possible fire", figures, doubt=True))
     return medium, found
 
 

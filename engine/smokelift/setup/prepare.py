@@ -14,7 +14,7 @@ from smokelift.footage.clip import Clip
 from smokelift.render import Image, scene_optics
 from smokelift.scene import SHADOWED, Background, CompleteScene, Domain, Scattering, Scene
 from smokelift.setup.coarse import coarse_frame, coarse_frames
-from smokelift.setup.first_estimate import FirstEstimate, first_estimate, first_findings
+from smokelift.setup.first_estimate import FirstEstimate, first_estimate, first_findings, is_given
 from smokelift.setup.further_views import disagreement, open_views
 from smokelift.setup.geometry import find_geometry
 from smokelift.setup.illumination import find_medium, find_scattering, first_light, light_doubts
@@ -74,11 +74,9 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
     if complete.scattering == "absorption":
         of_light = [found for found in of_light if found.about != "source radiance"]
     others, of_views = open_views(first, complete, samples.typical, bool(scene.lights), settings)
-    # with an alpha channel, which leaves no background to estimate, strokes alone count as a given one
-    decided = scene.background is not None and (not scene.background.estimated or estimate.found.source == "alpha")
     findings = [
         *clip.findings(),
-        *first_findings(estimate, decided),
+        *first_findings(estimate, is_given(scene.background, estimate.found)),
         *geometry.findings,
         *of_medium,
         *of_light,

@@ -172,7 +172,7 @@ def extract(options: argparse.Namespace, say: Reporter) -> None:
     scene, source = scene_of(options)
     with Clip.open(source) as clip:
         extraction = pipeline.extract(clip, scene)
-        for finding in clip.findings():
+        for finding in extraction.findings:
             say.note(finding)
         elements = enumerate(extraction.write(options.out), 1)
         files = list(map(str, say_frames(say, elements, len(extraction), "extracted")))

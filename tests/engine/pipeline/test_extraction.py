@@ -1,0 +1,55 @@
+"""What extract returns: before what shows the smoke's transmittance and what does not, and what it says of the clip."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy import ndimage
+
+from smokelift import Background, Clip, Extraction, Scene, extract
+from tests.engine.films import COUNT, film, puff, wall
+
+BLACK, GRAY, GREEN = np.zeros((72, 56, 3)), np.full((72, 56, 3), 0.2), np.full((72, 56, 3), (0.05, 0.4, 0.08))
+
+
+def kinds(extraction: Extraction) -> list[str]:
+    """What is said of a clip."""
+    return [finding.kind for finding in extraction.findings]
+
+
+def shot(folder: Path, plate: np.ndarray) -> Clip:
+    """A clip of gray smoke, in the middle of the picture, before a plate."""
+    return film(folder, plate, puff, 0.5).part(6, COUNT - 8)
+
+
+@pytest.mark.parametrize("plate", [BLACK, GRAY], ids=["black", "gray"])
+def test_what_does_not_show_how_much_passes_gets_a_steady_alpha(tmp_path, plate) -> None:
+    with shot(tmp_path, plate) as clip:
+        extraction = extract(clip, Scene())
+        assert not extraction.measured and "alpha of evenly lit smoke" in kinds(extraction)
+        sums = []
+        for frame in (0, 5, 10):
+            element, true = extraction.element(frame), np.clip(puff(6 + frame), 0, 1)
+            opacity = 1 - element.transmittance
+            assert opacity[ndimage.maximum_filter(true, 13) == 0].max() == 0
+            assert 0.8 < opacity[true > 0].sum() / true.sum() < 1.3
+            assert np.sqrt(np.square(element.over(plate) - clip.frame(frame)).mean()) < 0.005
+            sums.append(opacity.sum() / true.sum())
+    assert np.ptp(sums) < 0.1, "the thickest smoke of the clip, not of each frame, is opaque"
+
+
+def test_one_color_of_another_hue_shows_how_much_passes(tmp_path) -> None:
+    with shot(tmp_path, GREEN) as clip:
+        extraction = extract(clip, Scene())
+        assert extraction.measured and "alpha of evenly lit smoke" not in kinds(extraction)
+        wrong = 1 - extraction.element(4).transmittance - np.clip(puff(10), 0, 1)
+    assert np.sqrt(np.square(wrong).mean()) < 0.05
+
+
+def test_what_a_run_would_say_of_the_background_is_said(tmp_path) -> None:
+    with film(tmp_path, wall(0.2, 0.5), puff, 0.6) as clip:
+        assert kinds(extract(clip, Scene())) == ["background seen"]
+    with film(tmp_path / "clear", wall(0.2, 0.5), lambda n: 0 * puff(n), 0.6) as clip:
+        extraction = extract(clip, Scene(background=Background(frame=0)))
+        assert {"no smoke examined", "no smoke before the given background"} <= set(kinds(extraction))
+        assert all((element.transmittance == 1).all() for element in extraction)
