@@ -133,9 +133,14 @@ class FirstEstimate:
 
 
 def first_estimate(
-    clip: Clip, camera: Camera | None, background: Background | None, medium: Medium | None = None
+    clip: Clip,
+    camera: Camera | None,
+    background: Background | None,
+    medium: Medium | None = None,
+    *,
+    by_hue: bool = False,
 ) -> FirstEstimate:
-    """Estimate what a clip shows; other parameters and errors as of `find_background`.
+    """Estimate what a clip shows; other parameters and errors as of `find_background` and `with_source`.
 
     Where the ``medium`` that is given has a color of its flame there is fire, however little of it is certain.
     """
@@ -147,13 +152,13 @@ def first_estimate(
     given = flame_color is not None and hot.fraction > 0
     if not given:
         # what shines through smoke and is part of the plate does not burn
-        plate, source, samples = with_source(found, clip, samples)
+        plate, source, samples = with_source(found, clip, samples, by_hue=by_hue)
     burning = hot_pixels(samples.colors, samples.behind)
     if given or burning.burn:
         doused = without_fire(clip, plate)
         light = firelight(clip, doused)
         fire, hot, clip = Fire(light, flame_color or fire_color(clip, light)), burning, doused
-        plate, source, samples = with_source(found, clip, sample_smoke(clip, found.plate))
+        plate, source, samples = with_source(found, clip, sample_smoke(clip, found.plate), by_hue=by_hue)
     if plate is not found.plate:
         clip = cleared(clip, plate)  # what a mask hides showed the plate as it was, and would be smoke before this one
     return FirstEstimate(clip, found, plate, samples, fire, hot, source)
@@ -177,7 +182,8 @@ def with_source(
     """Return the plate of a clip, found in turn with its smoke, the usual source radiance (3,) of that, and samples.
 
     There is none before what does not show T: black, one color, or a given picture as good as one; and without smoke.
-    A fit does as well with the picture itself before one color; ``by_hue`` asks whether its hue shows T, unless dark.
+    Before one color a fit in a given light does as well with the picture itself. In an assumed one that makes holes of
+    shaded sides; ``by_hue`` asks whether the color's hue shows T, unless it is dark (docs/experiments/extraction.md).
     ``samples`` are those before the plate as it was found.
     """
     if not samples.smoky:

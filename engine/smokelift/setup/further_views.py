@@ -88,7 +88,8 @@ def _open_view(number: int, clip: Clip, scene: CompleteScene, light_assumed: boo
     if background is None and scene.background.color is not None:
         background = replace(scene.background, strokes=None)
     found = find_background(view_clip, camera, background)
-    plate, source, _ = with_source(found, found.clip, sample_smoke(found.clip, found.plate))
+    samples = sample_smoke(found.clip, found.plate)
+    plate, source, _ = with_source(found, found.clip, samples, by_hue=light_assumed)
     try:
         shown = ShotView.facing(scene.domain, found.clip, camera, plate, source, light_assumed)
     except ValueError as error:

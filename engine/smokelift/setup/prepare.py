@@ -49,7 +49,7 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
     require_kind(settings, Settings | None, "settings", "Settings (Settings.preset makes them)")
     settings = settings or Settings.preset()
     _check(len(clip), scene, settings)
-    estimate = first_estimate(clip, scene.camera, scene.background, scene.medium)
+    estimate = first_estimate(clip, scene.camera, scene.background, scene.medium, by_hue=not scene.lights)
     samples = estimate.samples
     geometry = find_geometry(scene, estimate, settings)
     camera, domain = geometry.camera, geometry.domain
