@@ -10,16 +10,20 @@ outlier of the noise. Figures: docs/experiments/extraction.md.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 import smokelift._core as _core
 from smokelift.extraction.matte import matte
 from smokelift.extraction.plate import Plate, noise_at, resized
+from smokelift.footage.clip import Clip
+from smokelift.footage.frame_source import OPAQUE
 from smokelift.footage.images import Picture, area_average, blurred, channel_mean, linear_to_srgb, reduced_size
-from smokelift.footage.noise import linear_per_srgb
+from smokelift.footage.noise import EIGHT_BIT_STEP, linear_per_srgb
 
 FULL_SCALE = 0.12
 """Distance, over the longer side of the picture, at which smoke's opacity has its whole range."""
@@ -156,6 +160,44 @@ def extract_element(picture: Picture, plate: Plate, source: Picture, size: tuple
     noise += np.square(MODEL_ERROR * passed).mean(-1)
     fine_weight = np.asarray(weight * own / np.maximum(own + noise, MIN_VARIANCE), np.float32)
     return Element(smooth + fine_weight[..., None] * (small - passed - smooth), clear, deviation, shared, weight)
+
+
+def clip_element(
+    clip: Clip,
+    frame: int,
+    plate: Plate,
+    source: Picture,
+    size: tuple[int, int],
+    part: Callable[[NDArray[Any]], NDArray[Any]] | None = None,
+) -> Element:
+    """Return the smoke of a ``part`` of a clip's frame, by default all of it: what alpha says, or else extracted.
+
+    ``plate`` is that of the clip; ``source`` and ``size`` are those of `extract_element`.
+    """
+    picture, plate, alpha = clip.stored(frame), plate.at(frame), clip.alpha(frame)
+    if part is not None:
+        picture, plate, alpha = picture.cut(part), plate.through(part), None if alpha is None else part(alpha)
+    if alpha is None:
+        return extract_element(picture.linear(), plate, source, size)
+    seen, behind, opacity = (area_average(each, *size) for each in (picture.linear(), plate.image, alpha))
+    sent = np.maximum(seen - (1 - opacity)[..., None] * behind, 0)
+    none, rounded = np.zeros_like(opacity), np.full_like(opacity, EIGHT_BIT_STEP)
+    return Element(sent, 1 - opacity, rounded, none, np.ones_like(opacity))
+
+
+def alpha_source(clip: Clip, plate: Plate, frames: Sequence[int], side: int) -> Picture | None:
+    """Return the usual J (3,) of the smoke in some frames of a clip with alpha: S over 1 - T.
+
+    None if most of what alpha covers is opaque. Then alpha may be a mask around smoke and what is behind it, and no
+    more of opaque smoke is known than its picture shows. Pictures are reduced to ``side`` pixels along the longer side.
+    """
+    size = reduced_size(*clip.size, side)
+    elements = [clip_element(clip, frame, plate, np.ones(3, np.float32), size) for frame in frames]
+    opacity = 1 - np.stack([element.transmittance for element in elements])
+    if (opacity >= OPAQUE).sum() > 0.5 * (opacity > 1 - OPAQUE).sum():
+        return None
+    sent = np.sum([element.radiance.sum((0, 1)) for element in elements], axis=0)
+    return np.asarray(np.maximum(sent / opacity.sum(), MIN_SOURCE), np.float32)
 
 
 def evenly_lit_element(picture: Picture, plate: Plate, source: Picture) -> Element:

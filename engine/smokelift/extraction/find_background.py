@@ -183,7 +183,9 @@ def find_background(clip: Clip, camera: Camera | None, background: Background | 
             return known_plate(mean_of_frames(frames, clip) if frames else given, clip, filmed=filmed)
 
         plate, shown = known(clip)
-        quiet = without_noise_light(clip, plate.noise)
+        if gray is not None:  # no camera filmed the color that alpha leaves open
+            plate, shown = replace(plate, image=np.full_like(plate.image, clip.alpha_background)), clip
+        quiet = clip if gray is not None else without_noise_light(clip, plate.noise)
         if quiet is not clip:
             # the noise stays that of the filmed pictures: in the others, mean sRGB values are too low
             noise, (plate, shown) = plate.noise, known(quiet)

@@ -179,6 +179,16 @@ class Clip:
         """Return frame ``n`` as it is stored, of which a part or means cost less than the linear `frame`."""
         return _kept(self._stored, LINEAR_BYTES, partial(self._sound, self._read), n)
 
+    def alpha(self, n: int) -> Picture | None:
+        """Return the alpha (height, width) of frame ``n`` as filmed, 0 where a mask hides it; None if opaque."""
+        if self.alpha_background is None:
+            return None
+        alpha = self._sound(self._filmed, n).alpha
+        if alpha is None:  # an opaque picture among others
+            alpha = np.ones(self.size[::-1], np.float32)
+        seen = self.seen(n, *self.size)
+        return alpha if seen is None else np.where(seen, alpha, np.float32(0))
+
     def as_held(self, picture: Picture) -> Picture:
         """Return a linear picture (rows, columns, 3) of the clip's size with its colors as coarse as the file's."""
         return self._source.as_held(picture)

@@ -61,11 +61,13 @@ class StoredPicture:
     """A picture in linear values, or in codes for them: 8 bit codes take a quarter of the memory.
 
     ``values`` (rows, columns, 3) are linear float32, or uint8 or uint16 codes, row 0 at the top. ``table`` (n,) float32
-    is the linear value of each code, None if the values are linear.
+    is the linear value of each code, None if the values are linear. ``alpha`` (rows, columns) is that of a picture of
+    the file which has it, and is shown over the `alpha_background`; None of others, and of what is made of pictures.
     """
 
     values: npt.NDArray[Any]
     table: Picture | None = None
+    alpha: Picture | None = None
 
     @property
     def size(self) -> tuple[int, int]:
@@ -147,12 +149,14 @@ class FrameSource:
     def close(self) -> None:
         """Close the file, if one is held open."""
 
-    def shown(self, layer: Layer) -> Picture:
+    def shown(self, layer: Layer) -> StoredPicture:
         """Return a picture over the background that alpha leaves open, or over black if there is none."""
         picture, alpha = layer
-        if alpha is None or not self.alpha_background:
-            return picture
-        return picture + (np.float32(1.0) - alpha[..., None]) * np.float32(self.alpha_background)
+        if self.alpha_background is None:
+            return StoredPicture(picture)
+        if alpha is not None and self.alpha_background:
+            picture = picture + (np.float32(1.0) - alpha[..., None]) * np.float32(self.alpha_background)
+        return StoredPicture(picture, alpha=alpha)
 
     def _sound_samples(self, read: Callable[[int], Sample]) -> Iterator[Sample]:
         """Read a few frames spread over all, with smoke and without; damaged ones are left out."""
@@ -217,13 +221,15 @@ class ImageSequence(FrameSource):
 
     def read(self, n: int) -> StoredPicture:
         image = self.shown(self._layer(n))
-        height, width = image.shape[:2]
+        width, height = image.size
         self._size = self._size or (width, height)
         if (width, height) != self._size:
             raise ClipError(
                 f"{self.files[n]}: is {width} x {height} pixels, the first picture {self._size[0]} x {self._size[1]}"
             )
-        return StoredPicture(area_average(image, *readable_size(width, height)))
+        size = readable_size(width, height)
+        alpha = None if image.alpha is None else area_average(image.alpha, *size)
+        return StoredPicture(area_average(image.values, *size), alpha=alpha)
 
     def _stored(self, n: int) -> Codes | Layer:
         try:

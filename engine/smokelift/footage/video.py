@@ -105,7 +105,7 @@ class Video(FrameSource):
     def read(self, n: int) -> StoredPicture:
         frame = self._decode(self._shown[n])
         if _has_alpha(frame) or self._stream.codec_context.color_primaries in PRIMARIES:
-            return StoredPicture(self.shown(self._layer(frame)))
+            return self.shown(self._layer(frame))
         codes = self._codes(frame)
         upright = np.ascontiguousarray(_upright(codes, frame))
         return StoredPicture(upright, code_values(np.iinfo(codes.dtype).max, self._encoding(), _white(frame)))

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from smokelift.checks import Finding, require_kind
-from smokelift.extraction.element import Element, evenly_lit_element, extract_element
+from smokelift.extraction.element import Element, clip_element, evenly_lit_element
 from smokelift.extraction.plate import Plate
 from smokelift.footage.clip import Clip
 from smokelift.footage.frame_source import is_pattern
@@ -39,8 +39,8 @@ class Extraction:
     source : (3,)
         The smoke's usual source radiance.
     measured
-        Whether what is behind the smoke shows its transmittance. Black and the smoke's own color do not: there the
-        smoke is taken to be evenly lit, and the thickest opaque.
+        Whether the clip's alpha says the smoke's transmittance, or what is behind it shows it. Black and the smoke's
+        own color do not: there the smoke is taken to be evenly lit, and the thickest opaque.
     findings
         What was measured, assumed and noticed of the clip and what is behind the smoke, with the doubts.
     """
@@ -64,10 +64,9 @@ class Extraction:
 
     def element(self, frame: int) -> Element:
         """Return the element of a frame, counted from 0."""
-        picture, plate = self.clip.frame(frame), self.behind.at(frame)
         if self.measured:
-            return extract_element(picture, plate, self.source, self.clip.size)
-        return evenly_lit_element(picture, plate, self.source)
+            return clip_element(self.clip, frame, self.behind, self.source, self.clip.size)
+        return evenly_lit_element(self.clip.frame(frame), self.behind.at(frame), self.source)
 
     def write(self, path: str | Path) -> Iterator[Path]:
         """Write the elements as premultiplied linear RGBA (EXR, half) or straight sRGB (PNG, 8 bit); yield each file.
@@ -135,10 +134,9 @@ def extract(clip: Clip, scene: Scene) -> Extraction:
     require_kind(scene, Scene, "scene", "a Scene (Scene() leaves all open, Scene.load reads a file)")
     estimate = burning_smoke(clip, scene.camera, scene.background)
     findings = [*clip.findings(), *first_findings(estimate, is_given(scene.background, estimate.found))]
-    source, measured = estimate.source, estimate.source is not None
+    source, measured = estimate.source, estimate.source is not None or estimate.found.source == "alpha"
     if source is None:
         source = source_radiance(estimate.samples).astype(np.float32)
-        findings += [Finding("alpha of evenly lit smoke", about="alpha", source="assumed")] * bool(
-            estimate.samples.smoky
-        )
+        if estimate.samples.smoky and not measured:
+            findings.append(Finding("alpha of evenly lit smoke", about="alpha", source="assumed"))
     return Extraction(estimate.clip, estimate.plate, source, measured, tuple(findings))

@@ -33,8 +33,8 @@ SENTENCES: Mapping[str, str] = {
         "{path}: is truncated; only {frames:frame} of it can be used. Copy or export it again for the rest."
     ),
     "damaged frames": (
-        "{path}: {frames} missing or damaged; a neighboring good frame stands in, so the smoke stands still there. "
-        "Export the clip again to mend that."
+        "{path}: {frames} missing or damaged (counted from 0); a neighboring good frame stands in, so the smoke "
+        "stands still there. Export the clip again to mend that."
     ),
     "pictures without a frame rate": (
         "{path}: pictures carry no frame rate; {fps:g} frames per second are assumed. Give the frame rate if it is "
@@ -63,7 +63,13 @@ SENTENCES: Mapping[str, str] = {
         "both sides. Use frames {first} to {before} or {after} to {last}."
     ),
     # what is behind the smoke, and where it is
-    "alpha channel": "The clip has an alpha channel, which says where smoke is: the smoke is shown before {behind}.",
+    "alpha channel": (
+        "The clip has an alpha channel, which says where smoke is and how much it hides; it is shown before {behind}."
+    ),
+    "alpha is a mask": (
+        "Most of what alpha covers is opaque, so alpha says where smoke is but not how thick: the picture's brightness "
+        "says that."
+    ),
     "background unused": "The background that is given is not used: the alpha channel says what is smoke.",
     "black background": "Background not given: it is black.",
     "background of one color": "Background not given: it is of one color, {color:.2g} (linear).",

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from smokelift.checks import Finding
 from smokelift.density.observation import MAX_DARK_RADIANCE
-from smokelift.extraction.element import shows_transmittance
+from smokelift.extraction.element import alpha_source, shows_transmittance
 from smokelift.extraction.find_background import FoundBackground, find_background
 from smokelift.extraction.given_background import single_color
-from smokelift.extraction.hidden_plate import plate_and_source
+from smokelift.extraction.hidden_plate import SOURCE_FRAMES, plate_and_source
 from smokelift.extraction.matte import HotPixels, fire_color, firelight, hot_pixels, matte, without_fire
 from smokelift.extraction.plate import Plate, cleared
 from smokelift.footage.clip import Clip
@@ -181,13 +181,16 @@ def with_source(
 ) -> tuple[Plate, Picture | None, SmokeSamples]:
     """Return the plate of a clip, found in turn with its smoke, the usual source radiance (3,) of that, and samples.
 
-    There is none before what does not show T: black, one color, or a given picture as good as one; and without smoke.
+    There is none before what does not show T: black, one color, or a given picture as good as one; of alpha that is a
+    mask; and without smoke.
     Before one color a fit in a given light does as well with the picture itself. In an assumed one that makes holes of
     shaded sides; ``by_hue`` asks whether the color's hue shows T, unless it is dark (docs/experiments/extraction.md).
     ``samples`` are those before the plate as it was found.
     """
     if not samples.smoky:
         return found.plate, None, samples
+    if found.source == "alpha":
+        return found.plate, alpha_source(clip, found.plate, samples.smoky[:SOURCE_FRAMES], SAMPLE_SIDE), samples
     # a wall that was found is no even color, however little its light changes
     shown = visible_plate(found.plate, clip, samples.smoky[0])
     color = None if found.source == "picture" else single_color(shown)
@@ -254,6 +257,8 @@ def first_findings(estimate: FirstEstimate, given: bool) -> list[Finding]:
     said += doubts(found, samples, given)
     if found.source == "picture" and samples.clearest is not None and samples.unknown.any():
         said.append(Finding("clearest frame", {"frame": found.clip.numbers[samples.clearest]}))
+    if found.source == "alpha" and samples.smoky and estimate.source is None:
+        said.append(Finding("alpha is a mask", about="alpha", source="estimated"))
     if samples.exposure:
         said.append(Finding("exposure", {"change": samples.exposure}, about="exposure", source="measured"))
     return said

@@ -18,7 +18,7 @@ from dataclasses import replace
 import numpy as np
 
 from smokelift.checks import UNDETERMINED, Doubles, Figures, Finding
-from smokelift.extraction.element import SOURCE_SIDE, extract_element
+from smokelift.extraction.element import SOURCE_SIDE, clip_element
 from smokelift.extraction.matte import CLIPPED_VALUE, MIN_COLORED_VALUE
 from smokelift.footage.images import Picture, brightest_channel, channel_mean, reduced_size
 from smokelift.footage.noise import Noise
@@ -277,8 +277,7 @@ def brightest_smoke(estimate: FirstEstimate, source: Picture) -> float:
     ``source`` (3,) is the usual one. Without shadows no smoke is brighter than the light makes all of it.
     """
     clip, frame = estimate.clip, estimate.samples.smoky[0]
-    picture, plate = clip.stored(frame).linear(), estimate.plate.at(frame)
-    element = extract_element(picture, plate, source, reduced_size(*clip.size, SOURCE_SIDE))
+    element = clip_element(clip, frame, estimate.plate, source, reduced_size(*clip.size, SOURCE_SIDE))
     sent = channel_mean(element.radiance)[element.transmittance < 0.5]
     return float(np.percentile(sent, LIT_PERCENTILE)) if sent.size else 0.0
 

@@ -6,7 +6,7 @@ from functools import cached_property
 
 from smokelift.checks import Finding
 from smokelift.density import AxisEstimate, Observation
-from smokelift.extraction.element import Element, extract_element
+from smokelift.extraction.element import Element, clip_element
 from smokelift.extraction.plate import Plate, uncovered
 from smokelift.footage.clip import Clip
 from smokelift.render import Image, Optics
@@ -21,8 +21,8 @@ class ShotView:
 
     Frame 0 of ``clip`` is of the same moment as the input's. The grid is fitted to the small picture ``working``; for a
     camera that moves it is that of the first frame that shows the domain. ``source`` (3,) is the usual source radiance
-    of the smoke before a picture that shows its transmittance; then it is extracted. None before any other.
-    ``light_assumed`` is whether the scene's lights are not given.
+    of the smoke before a picture that shows its transmittance, or of a clip whose alpha says that; then its element is
+    fitted. None of any other. ``light_assumed`` is whether the scene's lights are not given.
     """
 
     clip: Clip
@@ -58,9 +58,7 @@ class ShotView:
         """The smoke of a frame, from 0, without the plate, as a small picture; None where ``source`` is."""
         if self.source is None:
             return None
-        picture = self.clip.stored(frame).cut(working.part).linear()
-        plate = self.plate.at(frame).through(working.part)
-        return extract_element(picture, plate, self.source, working.camera.size)
+        return clip_element(self.clip, frame, self.plate, self.source, working.camera.size, working.part)
 
     def working_at(self, frame: int, domain: Domain) -> WorkingPicture | None:
         """The small picture of a frame, from 0; None if the frame shows nothing of the domain."""

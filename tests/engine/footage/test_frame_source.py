@@ -43,7 +43,7 @@ def test_dark_smoke_stands_before_white_and_bright_smoke_before_black(gray, back
     source = FrameSource()
     source.alpha_background = alpha_background_of(clip)
     assert source.alpha_background == background
-    shown = source.shown(clip[1])
+    shown = source.shown(clip[1]).values
     np.testing.assert_allclose(shown[0, [0, 5]], [[0.5 * gray + 0.5 * background] * 3, [background] * 3], rtol=1e-6)
 
 

@@ -7,7 +7,7 @@ import pytest
 from scipy import ndimage
 
 from smokelift import Background, Clip, Extraction, Scene, extract
-from tests.engine.films import COUNT, film, puff, wall
+from tests.engine.films import COUNT, clip_of, film, puff, wall
 
 BLACK, GRAY, GREEN = np.zeros((72, 56, 3)), np.full((72, 56, 3), 0.2), np.full((72, 56, 3), (0.05, 0.4, 0.08))
 
@@ -53,3 +53,14 @@ def test_what_a_run_would_say_of_the_background_is_said(tmp_path) -> None:
         extraction = extract(clip, Scene(background=Background(frame=0)))
         assert {"no smoke examined", "no smoke before the given background"} <= set(kinds(extraction))
         assert all((element.transmittance == 1).all() for element in extraction)
+
+
+def test_a_clip_with_alpha_is_its_own_element_even_where_alpha_is_a_mask(tmp_path) -> None:
+    ramp = np.linspace(0, 1, 56, dtype=np.float32) * np.ones((72, 1), np.float32)
+    for name, alpha in (("element", ramp), ("mask", np.float32(ramp > 0.5))):
+        own = np.dstack([ramp * alpha * 0.5] * 3 + [alpha]).astype(np.float32)
+        with clip_of(tmp_path / name, [own] * 3, ".exr") as clip:
+            extraction = extract(clip, Scene())
+            assert extraction.measured
+            assert ("alpha is a mask" in kinds(extraction)) == (name == "mask")
+            np.testing.assert_allclose(extraction.element(1).rgba(), own, atol=1e-3)

@@ -84,3 +84,18 @@ def test_a_sequence_renders_to_what_its_fit_was_judged_by(plume, smooth, tmp_pat
             assert -10 * np.log10(error) == pytest.approx(frame.figures["psnr_working"], abs=0.1)
             shown = render(sequence.density(frame.number), sequence.scene, camera=view.camera)
             np.testing.assert_array_equal(shown, again)
+
+
+def test_what_alpha_says_of_the_transmittance_is_fitted(plume, smooth, tmp_path) -> None:
+    """Smoke whose left side lies in the shadow of something else is no thinner there."""
+    white, black = (replace(plume.scene, background=Background(color=(gray,) * 3)) for gray in (1.0, 0.0))
+    density = plume.densities[2]
+    sent, clear = render(density, black), (render(density, white) - render(density, black)).mean(-1)
+    sent = sent * np.linspace(0.1, 1, sent.shape[1], dtype=np.float32)[:, None]
+    for n in range(2):
+        write_image(tmp_path / f"a{n}.exr", np.dstack([sent, 1 - clear]))
+    with Clip.open(tmp_path / "a#.exr", fps=24) as clip:
+        first = next(iter(reconstruct(clip, replace(plume.scene, clip=None, lights=(), background=None), smooth)))
+    found = (render(first.density, white) - render(first.density, black)).mean(-1)
+    wrong = (found - clear)[clear < 0.97]
+    assert np.sqrt(np.square(wrong).mean()) < 0.05
