@@ -26,6 +26,7 @@ from smokelift.footage.image_files import (
     association,
     encoded_values,
     linear_layer,
+    may_be_straight,
     read_stored,
     readable_size,
 )
@@ -212,12 +213,16 @@ class ImageSequence(FrameSource):
         samples = self._sound_samples(self._stored)
         codes = (stored for stored in samples if not isinstance(stored, tuple) and stored.shape[-1] == 4)
         self._find_matte(map(encoded_values, codes), DECODERS[transfer or "srgb"], self._sound_samples(self._layer))
+        layers = (layer for layer in self._sound_samples(self._stored) if isinstance(layer, tuple))
+        linear = (np.dstack((values, alpha)) for values, alpha in layers if alpha is not None)
+        self._unlikely = self.alpha_background is not None and may_be_straight(linear)
 
     @property
     def notes(self) -> tuple[Finding, ...]:
+        notes = (*super().notes, *[Finding("perhaps straight colors", doubt=True)] * self._unlikely)
         if self._size is None or self._size == (small := readable_size(*self._size)):
-            return super().notes
-        return (*super().notes, Finding("scaled pictures", {"size": self._size, "scaled": small}))
+            return notes
+        return (*notes, Finding("scaled pictures", {"size": self._size, "scaled": small}))
 
     def read(self, n: int) -> StoredPicture:
         image = self.shown(self._layer(n))

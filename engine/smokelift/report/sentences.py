@@ -53,6 +53,10 @@ SENTENCES: Mapping[str, str] = {
     "premultiplied colors": (
         "The clip's colors are read as {held} by its alpha channel, because its smoke then has most nearly one color."
     ),
+    "perhaps straight colors": (
+        "The clip's colors are read as premultiplied by alpha, as its format says, but its smoke has more nearly one "
+        "color if they are straight. If they are, premultiply them (in Blender's compositor, by Alpha Convert)."
+    ),
     "further view": "{name}, {degrees:.0f} degrees from the input, frames {first} to {last}.",
     "disagreeing views": (
         "The views agree on only {agreed:.0%} of the smoke that they show. Check where their cameras stand, which "

@@ -114,3 +114,15 @@ def test_an_exr_is_premultiplied_in_linear_light_as_its_format_says(tmp_path) ->
         assert clip.alpha_background == 0
         np.testing.assert_allclose(clip.frame(2), stored(IN_CODES, 2, 0.715)[..., :3], rtol=1e-5)
         assert clip.findings() == ()
+
+
+@pytest.mark.parametrize("gray", [0.1, 0.715])
+def test_an_exr_that_can_hardly_be_premultiplied_is_doubted(tmp_path, gray) -> None:
+    for n in range(COUNT):
+        alpha = opacity(n)
+        own = gray * TINT * (alpha > 0)
+        write_exr(tmp_path / f"a{n}.exr", {"RGBA": np.concatenate([own, alpha], -1).astype(np.float32)})
+        write_exr(tmp_path / f"b{n}.exr", {"RGBA": np.concatenate([own * alpha, alpha], -1).astype(np.float32)})
+    for name, said in (("a", ["perhaps straight colors"]), ("b", [])):
+        with Clip.open(tmp_path / f"{name}#.exr", fps=24) as clip:
+            assert [note.kind for note in clip.findings()] == said
