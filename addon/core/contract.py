@@ -21,6 +21,8 @@ FRAME_FILE = "smoke_{:04d}.vdb"
 """File of a frame in a sequence's directory, by the number of its file: frame 1 has ``start_number``, which is 1 at
 first."""
 
+MAX_START_NUMBER = 1_000_000  # largest of these numbers
+
 PROXY_FILE = "proxy_{:04d}.vdb"  # there too, and in a folder with an export: the coarse copy of a frame
 PROXY_VOXELS = 4_000_000  # voxels of a box from which on a run writes coarse copies (measured: MIN_PROXY_VOXELS)
 EXPORT_FILE = "export.json"  # file in a folder with an export that says what was exported

@@ -31,7 +31,7 @@ from typing import Any
 from . import ShotError
 from .contract import DIRECTIONS, INDEX_FILE
 
-OPTIONS = ("--quality", "--device", "--detail", "--seed", "--resolution", "--distance")
+OPTIONS = ("--quality", "--device", "--detail", "--seed", "--resolution", "--distance", "--start-number")
 """The engine's options that a take may hold: those that decide the result."""
 
 TITLES = {"continue": "Continued", "retime": "Retimed", "loop": "Loop"}  # what a take is called that is made of another

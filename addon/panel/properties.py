@@ -8,7 +8,7 @@ from bl_ui.utils import PresetPanel
 from bpy.props import PointerProperty
 
 from ..core import ShotError
-from ..core.contract import QUALITIES
+from ..core.contract import MAX_START_NUMBER, QUALITIES
 from ..scene.blender import PACKAGE, PATH_OPTIONS
 from ..scene.smoke import is_smoke
 from .camera_panel import ShotSettings
@@ -24,7 +24,7 @@ MANUAL = Path(__file__).parents[1] / "manual" / "index.html"  # the manual, whic
 FOLDER = "smokelift"  # below the user's folder of presets
 
 SETTINGS = (
-    *("quality", "detail", "light_mode", "closed", "longest_side", "transfer", "speed", "device"),
+    *("quality", "detail", "light_mode", "closed", "longest_side", "transfer", "speed", "device", "start_number"),
     *("use_medium", "extinction", "albedo", "anisotropy"),
 )
 """What does not belong to one clip: no paths, no objects, no frames."""
@@ -55,6 +55,9 @@ class SmokeliftSettings(
     directing: link("Direct", SmokeliftDirecting)("What is made of the result")
     output: string("Output", subtype="DIR_PATH", options=PATH_OPTIONS)(
         "Folder for the results; by default beside the .blend file, or beside the clip if that is unsaved"
+    )
+    start_number: whole("Start Number", default=1, min=0, max=MAX_START_NUMBER)(
+        "Number in the name of a result's first file, 1001 for example. The frames themselves count from 1"
     )
 
 

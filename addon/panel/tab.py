@@ -50,6 +50,7 @@ def _draw_tab(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy
     layout.prop(settings, "detail")
     draw_settings(layout, settings, "seed", active=settings.detail > 0.0)
     layout.prop(settings, "output", placeholder=str(smoke_takes.output_folder(smoke)))
+    layout.prop(settings, "start_number")
     _draw_runs(layout, context, smoke)
 
 

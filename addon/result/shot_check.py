@@ -78,7 +78,7 @@ state = ShotCheck()  # the check of this session, which is never saved
 
 NEUTRAL = {
     *("quality", "seed"),
-    *("output", "folder", "results", "saved_as", "before", "directing", "speed", "between"),
+    *("output", "start_number", "folder", "results", "saved_as", "before", "directing", "speed", "between"),
     *("set_up_range", "set_up_camera", "set_up_light", "set_up_plate", "set_up_colors", "plate_place"),
     "assumed_camera",
 }

@@ -91,7 +91,8 @@ def write_take(smoke: bpy.types.Object) -> Take:
     take = _next_take(smoke)
     if smoke.smokelift.drawn_mask is not None:
         tables["clip"]["mask"] = take.copy_mask(Path(tables["clip"]["mask"]))
-    take.write(tables, engine_options(smoke))
+    number = smoke.smokelift.start_number
+    take.write(tables, [*engine_options(smoke), *([f"--start-number={number}"] if number != 1 else [])])
     _note_file(take)
     return take
 

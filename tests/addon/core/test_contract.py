@@ -23,7 +23,7 @@ from smokelift.extraction.find_background import MOVING_CAMERA
 from smokelift.footage.frame_source import ClipError, numbered_files
 from smokelift.footage.image_files import READABLE
 from smokelift.output.export import ASSET, NOTE
-from smokelift.output.index import INDEX, frame_path, proxy_path
+from smokelift.output.index import INDEX, MAX_START_NUMBER, frame_path, proxy_path
 from smokelift.output.vdb import MIN_PROXY_VOXELS
 from smokelift.scene import SIDES, EnvironmentLight, SceneError
 from smokelift.setup.settings import LIMITS, QUALITIES, Settings
@@ -35,6 +35,7 @@ def test_names_are_the_engines() -> None:
     assert (contract.DONE, contract.BAD_INPUT, contract.CANCELLED) == (DONE, BAD_INPUT, CANCELLED)
     assert contract.INDEX_FILE == INDEX
     assert contract.FRAME_FILE.format(12) == frame_path(Path(), 12, "vdb").name
+    assert contract.MAX_START_NUMBER == MAX_START_NUMBER
     assert contract.PROXY_FILE.format(12) == proxy_path(Path(), 12).name
     assert contract.PROXY_VOXELS == MIN_PROXY_VOXELS
     assert (contract.EXPORT_FILE, contract.ASSET_FILE) == (NOTE, ASSET)

@@ -94,7 +94,7 @@ SAVED = {
     "smokelift": "albedo anisotropy assumed_camera before between box camera_mode clip closed detail device directing "
     "distance drawn_mask extinction first folder fps inlet is_smoke last light_mode longest_side mask output plate "
     "plate_frames plate_mode plate_place quality results saved_as seed set_up_camera set_up_colors set_up_light "
-    "set_up_plate set_up_range speed strokes transfer use_medium",
+    "set_up_plate set_up_range speed start_number strokes transfer use_medium",
     "smokelift_export": "folder host precision proxy use_velocity",
 }
 """Settings by the names under which .blend files and scripts have them."""

@@ -130,6 +130,14 @@ def test_results_are_picked_named_and_deleted(shot, tmp_path) -> None:
         bpy.ops.smokelift.show_take(take=str(second.directory))
 
 
+def test_files_begin_at_the_start_number(shot, tmp_path) -> None:
+    settings = smoke(shot).smokelift
+    settings.output = str(tmp_path / "out")
+    assert not any(word.startswith("--start-number") for word in smoke_takes.write_take(smoke(shot)).arguments())
+    settings.start_number = 1001
+    assert "--start-number=1001" in smoke_takes.write_take(smoke(shot)).arguments()
+
+
 def with_masses(folder: Path, masses: list[float], planned: int = 0, complete: bool = True, **tables: object) -> Take:
     """A take whose frames hold so much smoke, of so many that it will have."""
     take = made(folder, frames=len(masses), used=[10, 9 + (planned or len(masses))], **tables)
