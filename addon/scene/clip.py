@@ -21,7 +21,7 @@ TRANSFERS = {"sRGB": "srgb", "Linear Rec.709": "linear", "scene_linear": "linear
 """The engine's name of the transfer function of a clip's pixels, by Blender's color space."""
 
 SATURATION = 0.25  # fraction of the frame's saturation that is kept below the strokes
-MIN_STROKE = 0.5  # smallest alpha of a stroke, and smallest difference of its channels: twice that of the frame below
+MIN_STROKE = 0.5  # smallest alpha of a stroke, and lead of its channel over the next: twice the frame's
 WRITTEN = "smokelift_written"  # custom property of an image with a frame below: its file's time when written
 Pixels = npt.NDArray[np.float32]  # red, green, blue and alpha of an image, (pixels, 4)
 
@@ -203,11 +203,13 @@ def lay_below(image: bpy.types.Image, picture: Path) -> None:
 
 
 def _strokes_in(values: Pixels) -> Pixels:
-    """The strokes in an image, in pure colors, and transparent elsewhere."""
-    colors = values[:, :3]
-    painted = (values[:, 3] > MIN_STROKE) & (np.ptp(colors, axis=1) > MIN_STROKE)
-    strokes = np.zeros_like(values)
-    strokes[painted, colors.argmax(1)[painted]] = strokes[painted, 3] = 1.0
+    """The strokes in an image, in pure colors, and transparent elsewhere; mixed ones stay, which the engine refuses."""
+    colors, opaque = values[:, :3], values[:, 3] > MIN_STROKE
+    low, middle, high = np.sort(colors, axis=1).T
+    pure, mixed = (opaque & (above - below > MIN_STROKE) for above, below in ((high, middle), (middle, low)))
+    strokes = np.where(mixed[:, None], values, np.float32(0))
+    strokes[pure] = 0.0
+    strokes[pure, colors.argmax(1)[pure]] = strokes[pure | mixed, 3] = 1.0
     return strokes
 
 

@@ -56,8 +56,8 @@ COLOR_WEIGHT = 1e-4
 """Weight of the color itself in each pixel, beside that of a pixel that shows it."""
 
 PAINTED = 0.5
-"""Alpha, difference of a stroke's channels, and fraction of a pixel's area, from which on a pixel is painted: nearer to
-a pure color than to none."""
+"""Alpha, lead of a stroke's channel over both others, and fraction of a pixel's area, from which on a pixel is painted:
+nearer to a pure color than to none."""
 
 MEDIAN_FRAMES = 15
 """Number of frames whose median is the background: what smoke passes in fewer than half of them."""
@@ -175,9 +175,16 @@ class Strokes:
         opaque = np.ones(values.shape[:2], np.bool_) if alpha is None else alpha >= PAINTED
         if not opaque.any():
             raise ClipError(f"{path}: nothing is painted there; paint strokes, or leave them out.")
-        painted = opaque & (np.ptp(values, axis=-1) >= PAINTED)
+        low, middle, high = np.moveaxis(np.sort(values, axis=-1), -1, 0)
+        painted = opaque & (high - middle >= PAINTED)
         if not painted.any():
             raise ClipError(f"{path}: no stroke is green (smoke), red (not smoke) or blue (behind); use pure colors.")
+        # the edge between two strokes is as thin as a pixel or two
+        mixed = opaque & ~painted & (middle - low >= PAINTED)
+        if ndimage.binary_opening(mixed, np.ones((3, 3))).any():
+            raise ClipError(
+                f"{path}: some strokes are neither green (smoke), red (not smoke) nor blue (behind); use pure colors."
+            )
         nearest = values.argmax(-1)
         red, green, blue = (area_average(painted & (nearest == n), *size) >= PAINTED for n in range(3))
         return Strokes(green, red, blue)

@@ -196,6 +196,14 @@ def test_a_given_plate_is_changed_in_the_strokes_alone(tmp_path) -> None:
     assert found.source == "given" and (mended.confidence == 1).all()
 
 
+def test_the_edge_of_two_strokes_is_none(tmp_path) -> None:
+    clip = film(tmp_path, GRADIENT, puff, 1.0)
+    edge = ((ROWS < 20, GREEN), (ROWS == 20, (128, 128, 0, 255)), (ROWS > 20, BLUE))
+    found, _ = painted(clip, *edge)
+    assert not found.strokes.other.any()
+    np.testing.assert_array_equal(found.strokes.smoke | found.strokes.behind, ROWS != 20)
+
+
 def test_a_stroke_says_nothing_of_what_is_unknown_elsewhere(tmp_path) -> None:
     random = np.random.default_rng(0)
     flicker = [random.uniform(0.4, 0.9) for _ in range(COUNT)]
