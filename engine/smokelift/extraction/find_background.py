@@ -204,8 +204,9 @@ def find_background(clip: Clip, camera: Camera | None, background: Background | 
             "out, or stabilize the clip and give one picture as background."
         )
     one_color = said.estimated and found.source != "picture"
-    # a picture was found with what is painted as smoke, and a color is given for what is behind it
-    behind = found.source == "picture" or said.color is not None
+    # a picture was found with what is painted as smoke; a color or a clean plate is given for what is behind it, but a
+    # frame of the clip may hold smoke
+    behind = found.source == "picture" or said.color is not None or said.image is not None
     left = replace(strokes, smoke=np.zeros_like(strokes.smoke)) if behind else strokes
     plate, clip = stroked(left, plate, found.clip, one_color)
     return replace(found, clip=clip, plate=plate, background=said, strokes=strokes)

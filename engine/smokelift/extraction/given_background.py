@@ -1,9 +1,10 @@
 """What a scene says is behind the smoke: a color, clean plates, frames of its clip, and strokes painted over one.
 
 Strokes say where smoke is, where none ever is, and where the background shows as it is. They add to what the clip
-shows, wherever the background came from. A given plate is unknown where smoke is painted; of one that frames show clear
-at times, only what never changes is (`clean_plate`). What is unknown is continued from around it. What is not smoke,
-and what is behind it, is known: the clip's own median over time.
+shows, wherever the background came from. A clean plate and a color stay known where smoke is painted. A frame of the
+clip that is named as plate may hold smoke, and is unknown there; of a plate that frames show clear at times, only what
+never changes is (`clean_plate`). What is unknown is continued from around it. What is not smoke, and what is behind it,
+is known: the clip's own median over time.
 """
 
 from __future__ import annotations

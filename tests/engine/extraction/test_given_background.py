@@ -236,11 +236,24 @@ def test_green_before_black_is_before_black(tmp_path, given) -> None:
     assert plate.image.max() < 1e-3
 
 
+def test_green_leaves_a_clean_plate_as_it_is(tmp_path) -> None:
+    """Over some of the picture or all of it: smoke is there, and what is behind it is known."""
+    clip = film(tmp_path, wall(0.2, 0.5), puff, 0.9)
+    write_image(tmp_path / "plate.exr", wall(0.2, 0.5), half=False)
+    known = find_background(clip, None, Background(image=tmp_path / "plate.exr")).plate
+    for where in (np.hypot(ROWS - 40, COLUMNS - 28) < 20, ROWS >= 0):
+        _, plate = painted(clip, (where, GREEN), image=tmp_path / "plate.exr")
+        np.testing.assert_array_equal(plate.image, known.image)
+        assert (plate.confidence == 1).all()
+
+
 def test_strokes_that_say_nothing_are_refused(tmp_path) -> None:
-    clip, white = film(tmp_path, GRADIENT, puff, 1.0), (255, 255, 255, 255)
+    clip, white, yellow = film(tmp_path, GRADIENT, puff, 1.0), (255, 255, 255, 255), (255, 255, 0, 255)
     for lines, width, said in (
         ((), 1, "nothing is painted"),
         (((ROWS < 20, white),), 1, "no stroke is green"),
+        (((ROWS < 20, yellow),), 1, "no stroke is green"),
+        (((ROWS < 20, yellow), (ROWS > 30, GREEN)), 1, "some strokes are neither green"),
         (((ROWS < 20, white),), 2, f"{2 * WIDTH} x {HEIGHT} pixels, another shape"),
     ):
         file = strokes(tmp_path, *lines)
@@ -249,9 +262,8 @@ def test_strokes_that_say_nothing_are_refused(tmp_path) -> None:
         with pytest.raises(ClipError, match=said):
             find_background(clip, None, Background(strokes=file))
     everywhere = strokes(tmp_path, (ROWS >= 0, GREEN))
-    write_image(tmp_path / "plate.png", GRADIENT)
     with pytest.raises(ClipError, match="nothing that is not smoke"):
-        find_background(clip, None, Background(image=tmp_path / "plate.png", strokes=everywhere))
+        find_background(clip, None, Background(frame=(0,), strokes=everywhere))
     with pytest.raises(ImageError, match="no such file"):
         find_background(clip, None, Background(strokes=tmp_path / "no.png"))
     with pytest.raises(ValueError, match="one frame"):
