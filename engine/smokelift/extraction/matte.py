@@ -71,6 +71,11 @@ MIN_BRIGHT_FRACTION = 0.25
 """Smallest fraction of the fire that is so bright: six public clips of fire have .4 to .7, red smoke and red ink none
 (docs/experiments/fire.md)."""
 
+PALE, FAINT = 0.9, 0.5
+"""Largest green over red, and blue over green, of what may be fire, and the fraction of `MIN_FLAME_RED` and of
+`MIN_BRIGHTNESS_RATIO` that it has at least: .003 to .03 of the smoke's pixels in seven faint, pale or small fires, at
+most .0001 in twelve clips without fire (docs/experiments/fire.md)."""
+
 MIN_COLORED_VALUE = 0.01
 """Linear value of a pixel's largest channel from which on its color counts: 8 bits show none in darker ones."""
 
@@ -160,11 +165,13 @@ def smoothing(noise: Noise) -> float:
 class HotPixels:
     """Smoke pixels that have the colors of fire and add as much light.
 
-    ``fraction`` is theirs of all smoke pixels, ``bright`` that of them which are brighter than light explains.
+    ``fraction`` is theirs of all smoke pixels, ``bright`` that of them which are brighter than light explains. Of all
+    smoke pixels ``possible`` are these, and fainter and paler ones that add more such light than other smoke does.
     """
 
     fraction: float
     bright: float
+    possible: float
 
     @property
     def burn(self) -> bool:
@@ -173,8 +180,8 @@ class HotPixels:
 
     @property
     def may_burn(self) -> bool:
-        """Whether some of them are brighter than light explains, as many as fire has at least."""
-        return self.fraction * self.bright > MIN_FIRE_FRACTION
+        """Whether as many of them as fire has at least may be fire."""
+        return self.possible > MIN_FIRE_FRACTION
 
 
 def hot_pixels(colors: Picture, behind: Picture) -> HotPixels:
@@ -182,17 +189,26 @@ def hot_pixels(colors: Picture, behind: Picture) -> HotPixels:
 
     ``colors`` and ``behind`` are the linear radiance (n, 3) of the smoke's pixels and of their background.
     """
+    if not len(colors):
+        return HotPixels(0.0, 0.0, 0.0)
     warm, strong = _like_fire(colors, behind)
     fire = warm & strong
-    if not fire.any():
-        return HotPixels(0.0, 0.0)
     added, brightest = brightest_channel(colors - behind), brightest_channel(colors)
-    # a core clipped to yellow or white does not show its color
-    other = ~warm & (brightest > MIN_COLORED_VALUE) & (brightest < CLIPPED_VALUE)
-    bright = colors[..., 0] > WHITE_RED
-    if other.mean() >= MIN_SMOKE_FRACTION:
-        bright |= added > MIN_BRIGHTNESS_RATIO * np.percentile(added[other], 95)
-    return HotPixels(float(fire.mean()), float(bright[fire].mean()))
+
+    def outshines(warm: Mask, ratio: float) -> Mask:
+        # a core clipped to yellow or white does not show its color
+        other = ~warm & (brightest > MIN_COLORED_VALUE) & (brightest < CLIPPED_VALUE)
+        enough = np.mean(other) >= MIN_SMOKE_FRACTION
+        return added > ratio * np.percentile(added[other], 95) if enough else np.zeros_like(warm)
+
+    bright = (colors[..., 0] > WHITE_RED) | outshines(warm, MIN_BRIGHTNESS_RATIO)
+    pale = _warmer(colors, PALE)
+    # what is reddest of it is its own light, not what shines through
+    red, green, blue = np.moveaxis(colors - behind, -1, 0)
+    own = (red > FAINT * MIN_FLAME_RED) & (np.maximum(green, blue) < PALE * red)
+    possible = (fire & bright) | (pale & own & outshines(pale, FAINT * MIN_BRIGHTNESS_RATIO))
+    of_fire = float(bright[fire].mean()) if fire.any() else 0.0
+    return HotPixels(float(fire.mean()), of_fire, float(possible.mean()))
 
 
 def without_fire(clip: Clip, plate: Plate) -> Clip:
@@ -241,5 +257,10 @@ def _doused(picture: Picture, plate: Plate) -> Picture:
 
 def _like_fire(colors: Picture, behind: Picture) -> tuple[Mask, Mask]:
     """Whether light is of a fire's color, and whether it adds as much to what is ``behind`` it."""
+    return _warmer(colors, WARM), colors[..., 0] - behind[..., 0] > MIN_FLAME_RED
+
+
+def _warmer(colors: Picture, limit: float) -> Mask:
+    """Whether green over red, and blue over green, are less than a limit."""
     red, green, blue = np.moveaxis(colors, -1, 0)
-    return (green < WARM * red) & (blue < WARM * green), red - behind[..., 0] > MIN_FLAME_RED
+    return np.asarray((green < limit * red) & (blue < limit * green))

@@ -231,9 +231,13 @@ SENTENCES: Mapping[str, str] = {
         "color {red:g}, {green:g}, {blue:g}. The smoke over the fire is filled in from beside it."
     ),
     "possible fire": (
-        "Some of the smoke may be fire: {fraction:.1%} of its pixels have the colors of fire, and {bright:.0%} of "
-        "these are brighter than light explains. That is too few to be certain, or something behind the smoke looks "
-        "like it. If it is fire, give its color as the flame's, for example 1, 0.4, 0.1."
+        "Some of the smoke may be fire: {fraction:.1%} of its pixels have the colors of fire and are brighter than the "
+        "other smoke. They are too few or too faint to be certain, or something behind the smoke looks like it. If it "
+        "is fire, give its color as the flame's, for example 1, 0.4, 0.1."
+    ),
+    "possible faint fire": (
+        "Some of the smoke may be fire: {fraction:.1%} of its pixels have nearly the colors of fire and are brighter "
+        "than the other smoke, but too pale or too faint to be told from it. If it is fire, hide it by a mask."
     ),
     "assumed light": (
         "Light not given: light from everywhere is assumed, as bright as smoke and background ask for (irradiance "

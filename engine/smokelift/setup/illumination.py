@@ -108,8 +108,9 @@ def find_medium(scene: Scene, estimate: FirstEstimate, camera: Camera, domain: D
         found.append(Finding("fire", figures, about="fire", value=fraction, source="measured"))
         medium = replace(medium, flame_color=fire.color)
     elif estimate.hot.may_burn:
-        figures = {"fraction": estimate.hot.fraction, "bright": estimate.hot.bright}
-        found.append(Finding("possible fire", figures, doubt=True))
+        # without pixels of fire's own colors a flame's color that is given finds none
+        kind = "possible fire" if estimate.hot.fraction else "possible faint fire"
+        found.append(Finding(kind, {"fraction": estimate.hot.possible}, doubt=True))
     return medium, found
 
 

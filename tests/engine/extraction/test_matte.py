@@ -154,11 +154,35 @@ def test_fire_of_which_little_is_bright_may_be_fire(bright, burns, may_burn) -> 
 
 @pytest.mark.parametrize(
     "what",
+    [{"flame": 0.2 * np.array(FLAME)}, {"flame": 0.6 * np.array((1, 0.8, 0.5)), "smoke": np.full(3, 0.1)}],
+    ids=["faint", "pale"],
+)
+def test_faint_and_pale_flames_may_be_fire(what) -> None:
+    hot = hot_pixels(*pixels(**what))
+    assert (hot.burn, hot.may_burn) == (False, True)
+
+
+def test_no_smoke_is_no_fire() -> None:
+    assert not hot_pixels(*np.zeros((2, 0, 3), np.float32)).may_burn
+
+
+@pytest.mark.parametrize(
+    "what",
     [{"flame": np.zeros(3)}, {"smoke": np.array((0.9, 0.45, 0.1)), "flame": np.zeros(3)}, {"flame": np.ones(3)}],
     ids=["no flame", "orange smoke", "white light"],
 )
 def test_what_is_no_fire(what) -> None:
     assert fire_fraction(*pixels(**what)) == 0
+    assert not hot_pixels(*pixels(**what)).may_burn
+
+
+def test_gray_smoke_before_a_red_wall_and_a_blue_sky_may_not_be_fire() -> None:
+    """What shines through smoke is not its own, and what gray smoke takes of a blue sky makes none red."""
+    opacity = np.linspace(0, 1, 1000, dtype=np.float32)[:, None]
+    for color in ((0.6, 0.2, 0.05), (0.2, 0.4, 0.7)):
+        behind = np.tile(np.float32(color), (1000, 1))
+        for smoke in (0.1, 0.5, 0.9):
+            assert not hot_pixels(behind * (1 - opacity) + smoke * opacity, behind).may_burn
 
 
 def test_a_bright_wall_behind_thin_smoke_is_no_fire() -> None:

@@ -10,12 +10,13 @@ import pytest
 
 from smokelift import Background, Clip, DirectionalLight, EnvironmentLight, Medium, Scene, Shot, prepare_shot
 from smokelift.checks import UNDETERMINED, Finding
+from smokelift.extraction.matte import HotPixels
 from smokelift.footage.noise import lasting_noise
 from smokelift.output.images import write_image
 from smokelift.setup import illumination
 from smokelift.setup.coarse import HeldOut
 from smokelift.setup.first_estimate import SmokeSamples
-from smokelift.setup.illumination import light_doubts, several_colors, smoke_color, source_radiance
+from smokelift.setup.illumination import find_medium, light_doubts, several_colors, smoke_color, source_radiance
 from tests.engine.conftest import Plume
 from tests.engine.setup.shots import shot_of
 
@@ -341,3 +342,21 @@ def test_smoke_of_one_color_is_not_said_to_have_several(one, other, behind):
     if behind is BLACK and other is WHITE:
         both.colors[500:] = 1.0
     assert several_colors(both) == []
+
+
+@pytest.mark.parametrize(
+    ("hot", "kind"),
+    [
+        (HotPixels(0.0003, 1.0, 0.0051), "possible fire"),
+        (HotPixels(0.0, 0.0, 0.0051), "possible faint fire"),
+        (HotPixels(0.0003, 0.3, 0.0001), None),
+    ],
+    ids=["few", "pale", "no more than elsewhere"],
+)
+def test_a_little_fire_is_a_hint_which_says_what_helps(plume, hot, kind) -> None:
+    """A color that is given for a flame finds none without a pixel of fire's own colors."""
+    nowhere = np.zeros((1, 1), np.bool_)
+    samples = SmokeSamples(1.0, nowhere, nowhere, *np.zeros((2, 0, 3), np.float32), ())
+    estimate = SimpleNamespace(samples=samples, fire=None, hot=hot)
+    _, found = find_medium(plume.scene, estimate, plume.scene.camera, plume.scene.domain)
+    assert [each.kind for each in found] == [kind] * (kind is not None)
