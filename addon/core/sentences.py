@@ -87,7 +87,10 @@ is at most 2, 4 and 8 % of the range."""
 
 POOR = "poor"  # the word for a PSNR below these
 
-UNRATED = ("smoke in the background", "background never seen")
+UNRATED = (
+    *("smoke in the background", "background never seen"),
+    *("background never seen beside strokes", "given background never seen"),
+)
 """Doubts with which smoke may match its clip well and still be wrong: a part of it is in the background."""
 
 OF_RESULT = ("dissolving smoke", "simulated frames", "simulated frames with given values", "overlap of a loop")

@@ -159,7 +159,8 @@ def made_up(shot: Shot) -> list[Finding]:
 
 def expected_shortcomings(shot: Shot) -> list[Finding]:
     """Return the doubts about a run that the set-up of its shot gives reason for."""
-    if shot.fire is not None or any(found.kind == "likely wrong light" for found in shot.findings):
+    named = {"likely wrong light", "given background never seen"}
+    if shot.fire is not None or any(found.kind in named for found in shot.findings):
         return []
     figures = next((found.figures for found in shot.findings if found.about == "scattering"), {})
     error = figures.get("error", 0.0)

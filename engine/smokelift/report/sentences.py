@@ -115,6 +115,14 @@ SENTENCES: Mapping[str, str] = {
         "Almost no part of the picture is ever free of smoke, so black is assumed behind it. Give a clean plate or a "
         "color as background."
     ),
+    "background never seen beside strokes": (
+        "Beside the green strokes almost no part of the picture is ever free of smoke, so black is assumed behind it. "
+        "Paint only smoke green, or give a clean plate or a color as background."
+    ),
+    "given background never seen": (
+        "{fraction:.0%} of what stands still in the picture is not the background that is given, which may belong to "
+        "another clip or take: give one of this clip, or none."
+    ),
     "smoke everywhere": (
         "Smoke covers {fraction:.0%} of a frame, and every part of the picture at some time. If another color than the "
         "one that was found is behind it, give that as background."
@@ -145,6 +153,10 @@ SENTENCES: Mapping[str, str] = {
         "evenly lit smoke whose thickest part is opaque."
     ),
     "no smoke examined": "No smoke found in {frames:examined frame}, so nothing about it could be measured.",
+    "no smoke beside strokes": (
+        "Nothing counts as smoke where red or blue is painted: if smoke passes there, erase these strokes. If it does "
+        "not, give another background."
+    ),
     "no smoke before the given background": (
         "The background that is given may hold the smoke, or belong to another clip: check it."
     ),

@@ -15,12 +15,12 @@ from smokelift.checks import Finding
 from smokelift.density.observation import MAX_DARK_RADIANCE
 from smokelift.extraction.element import alpha_source, shows_transmittance
 from smokelift.extraction.find_background import FoundBackground, find_background
-from smokelift.extraction.given_background import single_color
+from smokelift.extraction.given_background import ALIKE, single_color
 from smokelift.extraction.hidden_plate import SOURCE_FRAMES, plate_and_source
 from smokelift.extraction.matte import HotPixels, fire_color, firelight, hot_pixels, matte, without_fire
 from smokelift.extraction.plate import Plate, cleared
 from smokelift.footage.clip import Clip
-from smokelift.footage.images import Picture, area_average, reduced_size
+from smokelift.footage.images import Picture, area_average, linear_to_srgb, reduced_size
 from smokelift.footage.video import median_quantizer
 from smokelift.scene import Background, Camera, Medium
 from smokelift.scene.checks import Vector
@@ -41,7 +41,7 @@ MAX_BLACK = 0.001
 
 MAJORITY = 0.5
 """Fraction that is a majority: of the smoke's pixels, those whose background is unknown; of what bars enclose, the
-smoke of a frame."""
+smoke of a frame; of what stands still, what is not a given background."""
 
 MIN_BARS_FRACTION = 0.95
 """Fraction of what two bars enclose, covered at some time, from which it is the picture and no smoke: smoke that
@@ -80,6 +80,8 @@ class SmokeSamples:
     """Numbers of smoke pixels of the samples with smoke, in the order of ``colors``."""
     over_known: Mapping[int, int] = field(default_factory=dict)
     """Numbers of smoke pixels before a known background in each sample, by frame number."""
+    standing: float = 0.0
+    """Of what stands still, or of half of the picture if that is more, the fraction that is smoke in every sample."""
     exposure: float = 0.0
     """Largest fraction by which the exposure of a sample was changed."""
 
@@ -226,6 +228,7 @@ def sample_smoke(clip: Clip, plate: Plate) -> SmokeSamples:
     scale = max(1.0, max(width, height) / SAMPLE_SIDE)
     columns, rows = reduced_size(width, height, SAMPLE_SIDE)
     covered, unknown = np.zeros((2, rows, columns), np.bool_)
+    always, values = np.ones((rows, columns), np.bool_), []
     colors, behind = [], []
     over_known: dict[int, int] = {}
     counts: dict[int, int] = {}
@@ -236,6 +239,8 @@ def sample_smoke(clip: Clip, plate: Plate) -> SmokeSamples:
         exposure = max(exposure, float(np.expm1(np.abs(np.log(clip.gain(number))).max())))
         mask = matte(picture, clear).mask
         covered |= mask
+        always &= mask
+        values.append(linear_to_srgb(picture))
         hidden = unknown_part(reduced, clip, number)
         unknown |= hidden
         over_known[number] = int((mask & ~hidden).sum())
@@ -245,7 +250,10 @@ def sample_smoke(clip: Clip, plate: Plate) -> SmokeSamples:
             counts[number] = int(mask.sum())
     smoky = tuple(sorted(counts, key=lambda number: -counts[number]))
     radiance = np.concatenate(colors), np.concatenate(behind)
-    return SmokeSamples(scale, covered, unknown, *radiance, smoky, tuple(counts.values()), over_known, exposure)
+    still = (np.ptp(values, axis=0) <= ALIKE).all(-1)
+    standing = float((always & still).sum() / max(still.sum(), MAJORITY * still.size))
+    of_frames = tuple(counts.values()), over_known
+    return SmokeSamples(scale, covered, unknown, *radiance, smoky, *of_frames, standing, exposure)
 
 
 def first_findings(estimate: FirstEstimate, given: bool) -> list[Finding]:
@@ -322,11 +330,16 @@ def doubts(found: FoundBackground, samples: SmokeSamples, given: bool) -> list[F
         first, last = clip.numbers[0], clip.numbers[-1]
         said.append(doubt("cut", {"before": before, "after": after, "first": first, "last": last}))
     elif not samples.smoky:
-        said.append(what_helps(clip, given))
+        painted = found.strokes is not None and bool((found.strokes.other | found.strokes.behind).any())
+        said.append(what_helps(clip, given, painted))
     if found.source == "color around one frame":
         said.append(doubt("background of one frame"))
     if found.source == "black for want of a picture":
-        said.append(doubt("background never seen"))
+        green = found.strokes is not None and found.strokes.smoke.any()
+        said.append(doubt("background never seen beside strokes" if green else "background never seen"))
+    enough = len(samples.over_known) >= MIN_SAME_FRAMES
+    if found.source == "given" and enough and samples.standing > MAJORITY:
+        said.append(doubt("given background never seen", {"fraction": samples.standing}))
     covered = _covered_at_a_time(samples) / samples.covered.size
     if found.source == "color" and samples.covered.mean() >= MIN_EVERYWHERE_FRACTION and covered > MAJORITY:
         said.append(doubt("smoke everywhere", {"fraction": covered}))
@@ -346,13 +359,15 @@ def doubts(found: FoundBackground, samples: SmokeSamples, given: bool) -> list[F
     return said
 
 
-def what_helps(clip: Clip, given: bool) -> Finding:
-    """Return what may help where no smoke is found; ``given`` as in `doubts`."""
+def what_helps(clip: Clip, given: bool, painted: bool) -> Finding:
+    """Return what may help where no smoke is found; ``given`` as in `doubts`, ``painted`` if strokes hide anything."""
     if clip.mask is not None and clip.mask.files:
         with suppress(ValueError):  # the camera moves
             found = find_background(clip.as_filmed(), None, None)
             if sample_smoke(found.clip, found.plate).smoky:
                 return Finding("smoke behind the mask", doubt=True)
+    if painted:
+        return Finding("no smoke beside strokes", doubt=True)
     if given:
         return Finding("no smoke before the given background", doubt=True)
     if len(clip) == 1 and clip.alpha_background is None:

@@ -150,6 +150,7 @@ RANDOM = np.random.default_rng(0)
 TILES = np.kron(RANDOM.uniform(0.05, 0.3, (9, 7)), np.ones((8, 8)))
 ACROSS = np.abs(np.arange(56) - 28)
 """Pixels from the middle column."""
+ROWS = np.arange(72)[:, None]
 
 
 def before_tiles(smoke: np.ndarray, tiles: np.ndarray = TILES) -> np.ndarray:
@@ -211,6 +212,49 @@ def test_strokes_are_said_and_what_is_green_is_not_in_the_plate(gray) -> None:
     found = replace(gray, strokes=Strokes(smoke, nothing, ~smoke))
     assert background_findings(found)[-1] == Finding("strokes", {"smoke": 0.5, "other": 0.0, "behind": 0.5})
     assert doubts(found, replace(SEEN, unknown=unknown), given=False) == []
+
+
+def test_strokes_that_contradict_the_clip_are_named(tmp_path) -> None:
+    """Nothing but green over a clip of smoke that passes a little of it, and red over all of it."""
+    clip = clip_of(tmp_path, (before_tiles(0.5 * (np.hypot(ACROSS - 9 + n, ROWS - 30) < 4)) for n in range(12)))
+    for color, wanted in ((1, "background never seen beside strokes"), (0, "no smoke beside strokes")):
+        painted = np.zeros((72, 56, 3), np.float32)
+        painted[..., color] = 1
+        write_image(tmp_path / "strokes.png", painted)
+        said = first_findings(first_estimate(clip, None, Background(strokes=tmp_path / "strokes.png")), given=False)
+        assert wanted in [each.kind for each in said]
+
+
+def column(n: int) -> np.ndarray:
+    """Smoke that never leaves its place, and a puff that rises."""
+    return np.maximum(puff_at(60 - 4 * n), 0.8 * (ACROSS < 10))
+
+
+def fog(n: int) -> np.ndarray:
+    """Smoke that fills the picture all the time."""
+    return 0.5 + 0.2 * np.sin(n + ROWS / 9) * np.ones(56)
+
+
+@pytest.mark.parametrize(
+    ("smoke", "frames", "given", "said"),
+    [
+        (column, 12, TILES, False),
+        (fog, 12, TILES, False),
+        (column, 12, 0.9 - TILES, True),
+        (column, 12, (0.7, 0.4, 0.1), True),
+        (column, 1, 0.9 - TILES, False),
+    ],
+    ids=["right", "right behind fog", "another wall", "color of no wall", "one frame"],
+)
+def test_a_given_background_that_the_clip_never_shows_is_said(tmp_path, smoke, frames, given, said) -> None:
+    clip = clip_of(tmp_path, (before_tiles(smoke(n)) for n in range(frames)))
+    if isinstance(given, tuple):
+        background = Background(color=given)
+    else:
+        write_image(tmp_path / "plate.exr", np.repeat(given[..., None], 3, 2))
+        background = Background(image=tmp_path / "plate.exr")
+    found = find_background(clip, None, background)
+    assert kinds(found, sample_smoke(found.clip, found.plate), given=True) == ["given background never seen"] * said
 
 
 def test_smoke_before_a_wall_that_no_frame_shows_is_undetermined(tmp_path) -> None:

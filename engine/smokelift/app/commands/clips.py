@@ -113,10 +113,12 @@ def reconstruct(options: argparse.Namespace, say: Reporter) -> None:
     figures = [sequence.figures(number) for number in sequence.frames]
     if count_empty(figures) == len(figures):
         given = scene.background is not None and not scene.background.estimated
+        strokes = next((found.figures for found in shot.findings if found.kind == "strokes"), {})
+        painted = bool(strokes.get("other") or strokes.get("behind"))
         raise ValueError(
             f"No smoke found: nothing differs from the background by more than the clip's noise does, so all frames "
             f"in {out} are empty. "
-            f"{sentence(what_helps(shot.clip, given))}"
+            f"{sentence(what_helps(shot.clip, given, painted))}"
         )
     for doubt in shortcomings(figures, burns=shot.fire is not None):
         say.note(doubt)
