@@ -142,7 +142,7 @@ class FoundBackground:
     frames: int = 0
     """Number of the file's frames, up to the next cut, that it was estimated from."""
     uncut_span: tuple[int, int] | None = None
-    """First and last of these in the file; None where it was not estimated from frames."""
+    """First and last of these in the file, or of the clip's and those that are named; None where it is of no frames."""
     cut: tuple[int, int] | None = None
     """Frames of the file before and after a cut within the clip, if there is one."""
     strokes: Strokes | None = None
@@ -151,7 +151,7 @@ class FoundBackground:
     """The motion of the camera by which the clip's frames are registered, if it moves."""
 
     def uncut_clip(self, clip: Clip) -> Clip:
-        """Return the part of a clip's file that the background was estimated from."""
+        """Return the part of a clip's file that the background was taken from."""
         return clip if self.uncut_span is None else clip.part(*self.uncut_span)
 
 
@@ -193,7 +193,9 @@ def find_background(clip: Clip, camera: Camera | None, background: Background | 
         if said.color is None:
             # one that many frames show has lost as much detail to the codec as they have; one color has none
             plate = replace(plate, finest=finest_detail(clip))
-        found = FoundBackground("alpha" if gray else "given", shown, plate, said, motion=motion)
+        # turns find what is behind smoke in the frames that are named, too
+        span = (min(*frames, clip.numbers[0]), max(*frames, clip.numbers[-1])) if frames else None
+        found = FoundBackground("alpha" if gray else "given", shown, plate, said, uncut_span=span, motion=motion)
     plate = uncovered(found.plate, found.clip) if found.source == "picture" else found.plate
     found = replace(found, clip=cleared(found.clip, plate), plate=plate)
     if strokes is None:

@@ -9,6 +9,7 @@ from PIL import Image
 
 from smokelift.extraction.find_background import FoundBackground, find_background
 from smokelift.extraction.given_background import background_picture, mean_of_frames, open_plates, read_background
+from smokelift.extraction.hidden_plate import plate_and_source
 from smokelift.extraction.matte import matte
 from smokelift.extraction.plate import Plate, known_plate
 from smokelift.footage.clip import Clip
@@ -17,6 +18,7 @@ from smokelift.footage.image_files import ImageError
 from smokelift.footage.images import srgb_to_linear
 from smokelift.output.images import write_image
 from smokelift.scene import Background, Camera, ClipSource, Scene, look_at_matrix
+from smokelift.setup.first_estimate import sample_smoke
 from tests.engine.films import (
     COUNT,
     HEIGHT,
@@ -245,6 +247,17 @@ def test_green_leaves_a_clean_plate_as_it_is(tmp_path) -> None:
         _, plate = painted(clip, (where, GREEN), image=tmp_path / "plate.exr")
         np.testing.assert_array_equal(plate.image, known.image)
         assert (plate.confidence == 1).all()
+
+
+def test_a_named_frame_shows_what_is_behind_green(tmp_path) -> None:
+    """Also outside of the frames in use, in all of which smoke sways where the stroke is."""
+    tiles = wall(0.2, 0.5)
+    clip = film(tmp_path, tiles, lambda n: np.roll(PLUME, round(4 * np.sin(n)), axis=1) * (n > 0), 0.9).part(6, 20)
+    where = (np.abs(COLUMNS - 28) < 16) & (ROWS > 10)
+    found, _ = painted(clip, (where, GREEN), frame=(0,))
+    smoky = sample_smoke(found.clip, found.plate).smoky
+    plate, _ = plate_and_source(found.clip, found.uncut_clip(found.clip), found.plate, smoky)
+    assert codes_apart(plate.image, tiles)[where].mean() < 4
 
 
 def test_strokes_that_say_nothing_are_refused(tmp_path) -> None:
