@@ -13,6 +13,7 @@ from addon.result.smoke_takes import output_folder
 from addon.scene import volume
 from addon.scene.scene_file import footage_tables
 from conftest import changed, made, pixels, pixels_of, save_image
+from smokelift.extraction.given_background import Strokes
 from smokelift.scene import Background
 from tests.addon.inside.panel.tab import drawn, know
 from tests.example_shot import EXAMPLE, smoke
@@ -155,6 +156,17 @@ def test_other_images_are_strokes_too(shot, tmp_path) -> None:
     paint(image, (0.3, 0.6, 0.3), 1.0, slice(4))
     assert Background(**footage_tables(smoke(shot))["background"]).strokes == tmp_path / "mine.png"
     assert pixels(tmp_path / "mine.png")[:4, :, 1] == pytest.approx(0.6, abs=0.01)
+
+
+def test_a_stroke_of_another_color_is_left_for_the_engine_to_refuse(shot, settings, tmp_path) -> None:
+    settings.output = str(tmp_path / "out")
+    assert bpy.ops.smokelift.paint_strokes() == {"FINISHED"}
+    for color, rows in (((1.0, 1.0, 0.0), slice(4)), ((0.0, 1.0, 0.0), slice(8, 12))):
+        paint(settings.strokes, color, 1.0, rows)
+    file = footage_tables(smoke(shot))["background"]["strokes"]
+    assert (pixels(Path(file))[:4] == (1.0, 1.0, 0.0, 1.0)).all()
+    with pytest.raises(ValueError, match="some strokes are neither"):
+        Strokes.read(Path(file), tuple(settings.clip.size))
 
 
 def test_strokes_that_cannot_be_written_are_named(shot, tmp_path) -> None:
