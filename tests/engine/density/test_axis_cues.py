@@ -116,6 +116,13 @@ def test_a_camera_that_does_not_look_down_on_the_floor_sees_no_contact(height) -
     assert not axis_of(seen(column(0.3), camera=low), low, BOX).depths.any()
 
 
+def test_smoke_that_goes_on_below_the_box_has_no_contact() -> None:
+    deep = Domain((-1, -1, -1), (1, 1, 3), (32, 32, 64))
+    smoke = np.pad(column(0.3), ((0, 0), (0, 0), (16, 0)), mode="edge")
+    renderer = Optics(deep, Medium(extinction=1.0), (), "absorption").renderer(FRONT, np.ones(3))
+    assert not axis_of([-np.log(renderer.image(smoke)[..., 0])], FRONT, BOX).depths.any()
+
+
 def test_known_inlets_need_no_contact() -> None:
     """Floating smoke stands where it is said to enter; above the second of two sources, between them."""
     smoke = seen(column(0.3, low=1.0), column(0.3, low=1.1))
