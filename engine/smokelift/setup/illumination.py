@@ -286,8 +286,8 @@ def brightest_smoke(estimate: FirstEstimate, source: Picture) -> float:
 def light_doubts(scattering: Finding, samples: SmokeSamples, noise: Noise, *, burns: bool) -> list[Finding]:
     """A doubt if an assumed light leaves much unexplained; ``burns`` if there is fire.
 
-    It is said only before one color that is not black. What moves there is smoke, and its brightness shows its light,
-    so the light itself is at fault.
+    It is said only before one color that is not black, nor of a hue that shows how much passes. What moves there is
+    smoke, and its brightness shows its light, so the light itself is at fault.
     """
     error = scattering.figures.get(f"error_{scattering.value}", 0.0)
     assert isinstance(error, float)

@@ -134,7 +134,8 @@ def _with_scattering(
     finer = partial(coarse_frame, (first,), coarse[0].number, scene, times=2)
     scattering, chosen = find_scattering(coarse, finer, settings)
     findings = [chosen]
-    if light_assumed:
+    if light_assumed and estimate.source is None:
+        # an element says how thick the smoke is, whatever its light
         findings += light_doubts(chosen, estimate.samples, estimate.plate.noise, burns=estimate.fire is not None)
     return replace(scene, scattering=scattering), findings
 
