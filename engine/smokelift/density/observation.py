@@ -346,7 +346,7 @@ def _over_one_color(observation: Observation, element: Element, plate: Plate) ->
     useful = np.hypot(1, element.deviation / USEFUL_DEVIATION)
     if observation.light_assumed:
         usual = opacity * (float(sent.sum()) / max(float(opacity.sum()), MIN_WEIGHT))
-        least = MIN_SENT * brightness
+        least = max(MIN_SENT * brightness, MIN_WEIGHT)
         unlike = np.log((sent + least) / (usual + least)) / (2 * BRIGHTNESS_RANGE)
         white = WHITE_IN_ASSUMED_LIGHT * brightness / np.hypot(useful, unlike)
     else:

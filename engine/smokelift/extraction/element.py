@@ -188,13 +188,15 @@ def clip_element(
 def alpha_source(clip: Clip, plate: Plate, frames: Sequence[int], side: int) -> Picture | None:
     """Return the usual J (3,) of the smoke in some frames of a clip with alpha: S over 1 - T.
 
-    None if most of what alpha covers is opaque. Then alpha may be a mask around smoke and what is behind it, and no
-    more of opaque smoke is known than its picture shows. Pictures are reduced to ``side`` pixels along the longer side.
+    None if alpha covers nothing, as of fire that is added, or if most of what it covers is opaque. Then alpha may be a
+    mask around smoke and what is behind it, and no more of opaque smoke is known than its picture shows. Pictures are
+    reduced to ``side`` pixels along the longer side.
     """
     size = reduced_size(*clip.size, side)
     elements = [clip_element(clip, frame, plate, np.ones(3, np.float32), size) for frame in frames]
     opacity = 1 - np.stack([element.transmittance for element in elements])
-    if (opacity >= OPAQUE).sum() > 0.5 * (opacity > 1 - OPAQUE).sum():
+    covered = (opacity > 1 - OPAQUE).sum()
+    if covered == 0 or (opacity >= OPAQUE).sum() > 0.5 * covered:
         return None
     sent = np.sum([element.radiance.sum((0, 1)) for element in elements], axis=0)
     return np.asarray(np.maximum(sent / opacity.sum(), MIN_SOURCE), np.float32)

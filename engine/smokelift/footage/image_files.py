@@ -387,7 +387,7 @@ def _read_exr(path: Path) -> Layer:
         target = image[max(0, y0 - top) :, max(0, x0 - left) :, channel]
         rows, columns = np.minimum(target.shape, pixels.shape)
         target[:rows, :columns] = pixels[:rows, :columns]
-    alpha = np.clip(image[..., 3], 0.0, 1.0) if opacity else None
+    alpha = np.clip(np.nan_to_num(image[..., 3]), 0.0, 1.0) if opacity else None
     return np.ascontiguousarray(image[..., :3]), alpha
 
 

@@ -39,7 +39,7 @@ class Extraction:
     source : (3,)
         The smoke's usual source radiance.
     measured
-        Whether the clip's alpha says the smoke's transmittance, or what is behind it shows it. Black and the smoke's
+        Whether the clip has alpha, which is taken as it is, or what is behind the smoke shows it. Black and the smoke's
         own color do not: there the smoke is taken to be evenly lit, and the thickest opaque.
     findings
         What was measured, assumed and noticed of the clip and what is behind the smoke, with the doubts.

@@ -71,8 +71,8 @@ SENTENCES: Mapping[str, str] = {
         "The clip has an alpha channel, which says where smoke is and how much it hides; it is shown before {behind}."
     ),
     "alpha is a mask": (
-        "Most of what alpha covers is opaque, so alpha says where smoke is but not how thick: the picture's brightness "
-        "says that."
+        "Alpha covers nothing, or most of what it covers is opaque, so it does not say how thick the smoke is: the "
+        "picture's brightness says that."
     ),
     "background unused": "The background that is given is not used: the alpha channel says what is smoke.",
     "black background": "Background not given: it is black.",
@@ -166,6 +166,7 @@ SENTENCES: Mapping[str, str] = {
     "smoke behind the mask": (
         "What the mask hides looks like smoke: if the mask is black where smoke may be and white elsewhere, invert it."
     ),
+    "no smoke in alpha": "The clip's alpha covers no smoke in these frames: look at the file, and use other frames.",
     "no smoke before an estimated background": (
         "Smoke that never moves counts as background, and smoke that changes it no more than it changes by itself is "
         "not seen: paint strokes over the smoke, or give a clean plate or a color as background."

@@ -186,7 +186,8 @@ def with_source(
     There is none before what does not show T: black, one color, or a given picture as good as one; of alpha that is a
     mask; and without smoke.
     Before one color a fit in a given light does as well with the picture itself. In an assumed one that makes holes of
-    shaded sides; ``by_hue`` asks whether the color's hue shows T, unless it is dark (docs/experiments/extraction.md).
+    shaded sides; ``by_hue`` asks whether the color's hue shows T, unless it is dark or dark smoke seems to have it
+    (docs/experiments/extraction.md).
     ``samples`` are those before the plate as it was found.
     """
     if not samples.smoky:
@@ -199,14 +200,21 @@ def with_source(
     if color is not None and not by_hue:
         return found.plate, None, samples
     plate, source = plate_and_source(clip, found.uncut_clip(clip), found.plate, samples.smoky)
-    dark = color is not None and color.max() <= MAX_DARK_RADIANCE * source.mean()
-    if dark or not shows_transmittance(visible_plate(plate, clip, samples.smoky[0]), source):
+    if color is not None and (color.max() <= MAX_DARK_RADIANCE * source.mean() or _of_hue(source, color)):
+        return found.plate, None, samples
+    if not shows_transmittance(visible_plate(plate, clip, samples.smoky[0]), source):
         return found.plate, None, samples
     if plate is not found.plate:
         # what no frame shows clear is unknown, although turns say what is behind it
         found_again = sample_smoke(cleared(clip, plate), plate)
         samples = replace(found_again, unknown=samples.unknown, over_known=samples.over_known)
     return plate, source, samples
+
+
+def _of_hue(source: Picture, color: Picture) -> bool:
+    """Whether a source radiance (3,) is nearer to a color's hue than to gray: it may be what smoke leaves of that."""
+    own, behind = source / source.mean(), color / color.mean()
+    return bool(np.linalg.norm(own - behind) < np.linalg.norm(own - 1))
 
 
 def visible_plate(plate: Plate, clip: Clip, frame: int) -> Picture:
@@ -366,11 +374,13 @@ def what_helps(clip: Clip, given: bool, painted: bool) -> Finding:
             found = find_background(clip.as_filmed(), None, None)
             if sample_smoke(found.clip, found.plate).smoky:
                 return Finding("smoke behind the mask", doubt=True)
+    if clip.alpha_background is not None:
+        return Finding("no smoke in alpha", doubt=True)
     if painted:
         return Finding("no smoke beside strokes", doubt=True)
     if given:
         return Finding("no smoke before the given background", doubt=True)
-    if len(clip) == 1 and clip.alpha_background is None:
+    if len(clip) == 1:
         return Finding("no smoke in one frame", doubt=True)
     return Finding("no smoke before an estimated background", doubt=True)
 

@@ -86,6 +86,13 @@ def test_a_shaded_side_is_no_hole_in_an_assumed_light(small, wall, element) -> N
     assert errors[True] < 0.5 * errors[False]
 
 
+def test_an_element_that_sends_nothing_before_black_is_seen(small, element) -> None:
+    """As where a flame, or its light, goes out."""
+    dark, plate = replace(element, radiance=0 * element.radiance), eight_bit_plate(np.zeros(3), small.camera.size)
+    observation = Observation(small.camera, dark.radiance, plate, dark, light_assumed=True)
+    assert np.isfinite(ObservedView.of(observation, scene_optics(completed(small))).background).all()
+
+
 def test_what_sends_no_light_tells_less_of_smoke_in_an_assumed_light(small, wall, element) -> None:
     """It may be hair before the wall; with the light known, smoke there would send none either."""
     hair = np.s_[4:8, 4:8]

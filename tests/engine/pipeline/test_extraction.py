@@ -55,6 +55,15 @@ def test_what_a_run_would_say_of_the_background_is_said(tmp_path) -> None:
         assert all((element.transmittance == 1).all() for element in extraction)
 
 
+def test_light_without_alpha_says_nothing_of_thickness(tmp_path) -> None:
+    """As of fire that is added: the run reads its brightness, and extract keeps the alpha of the file."""
+    pictures = [np.dstack([0.5 * puff(n)[..., None] * np.ones(3), 0 * puff(n)]).astype(np.float32) for n in range(6)]
+    with clip_of(tmp_path, pictures, ".exr") as clip:
+        extraction = extract(clip, Scene())
+        assert "alpha is a mask" in kinds(extraction) and np.isfinite(extraction.source).all()
+        assert all((element.transmittance == 1).all() for element in extraction)
+
+
 def test_a_clip_with_alpha_is_its_own_element_even_where_alpha_is_a_mask(tmp_path) -> None:
     ramp = np.linspace(0, 1, 56, dtype=np.float32) * np.ones((72, 1), np.float32)
     for name, alpha in (("element", ramp), ("mask", np.float32(ramp > 0.5))):

@@ -90,20 +90,24 @@ def test_what_a_mask_hides_says_nothing_of_how_much_passes(plume, tmp_path, mask
     assert (found.source is None) == masked
 
 
+BLUE = (0.15, 0.3, 0.6)
+
+
 @pytest.mark.parametrize(
-    ("color", "by_hue", "extracted"),
+    ("color", "smoke", "by_hue", "extracted"),
     [
-        ((0.15, 0.3, 0.6), False, False),
-        ((0.15, 0.3, 0.6), True, True),
-        ((0.3, 0.3, 0.3), True, False),
-        (0.0, True, False),
+        (BLUE, 0.5, False, False),
+        (BLUE, 0.5, True, True),
+        ((0.02, 0.3, 0.04), 0.01, True, False),
+        ((0.3, 0.3, 0.3), 0.5, True, False),
+        (0.0, 0.5, True, False),
     ],
-    ids=["blue, light given", "blue", "gray", "black"],
+    ids=["blue, light given", "blue", "dark smoke", "gray", "black"],
 )
-def test_one_color_shows_by_its_hue_how_much_passes(tmp_path, color, by_hue, extracted) -> None:
+def test_one_color_shows_by_its_hue_how_much_passes(tmp_path, color, smoke, by_hue, extracted) -> None:
     """Where the light is assumed the hue is asked, which tells smoke in shadow from thin smoke."""
     plate = np.broadcast_to(color, (72, 56, 3))
-    with film(tmp_path, plate, puff, 0.5) as clip:
+    with film(tmp_path, plate, puff, smoke) as clip:
         found = first_estimate(clip, None, Background(color=tuple(map(float, plate[0, 0]))), by_hue=by_hue)
     assert (found.source is not None) == extracted
 
