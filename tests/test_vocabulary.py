@@ -48,3 +48,9 @@ def test_names_avoid_words() -> None:
     avoided = re.compile(one_of([word.strip("`") for word in AVOIDED if "`" in word]))
     modules = {path: text for path, text in TEXTS.items() if path.endswith(".py")}
     assert {(path, name) for path, text in modules.items() for name in names_of(text) if avoided.search(name)} == set()
+
+
+def test_types_of_arrays_have_one_module() -> None:
+    aliases = re.compile(r"^(?:Array|Doubles|Floats|Mask|Values) = (?:npt\.)?NDArray\[np\.\w+\]$", re.MULTILINE)
+    found = {path for path, text in TEXTS.items() if path.endswith(".py") and aliases.search(text)}
+    assert found == {"engine/smokelift/checks/__init__.py"}
