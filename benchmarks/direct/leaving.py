@@ -16,9 +16,10 @@ import numpy.typing as npt
 
 from benchmarks.tables import markdown
 from smokelift.direct.continuation import DISSOLVED, ROOM, Continuation, continue_sequence
+from smokelift.direct.mesh import Mesh
 from smokelift.direct.retiming import default_overlap, loop_sequence, steady_part
 from smokelift.direct.state import open_source
-from smokelift.direct.surroundings import Ball, Fan
+from smokelift.direct.surroundings import Fan
 from smokelift.evaluation.orbit import Orbit
 from smokelift.output.images import eight_bit, write_sheet
 from smokelift.output.sequence import Sequence, box_around_all
@@ -37,12 +38,23 @@ def cases(domain: Domain) -> dict[str, Continuation]:
     width, height = a - x, c - z
     middle, left = (x + a) / 2, x + 0.1 * width
     depth = (y + b) / 2
-    fan = Fan(Ball((left, depth, z + 0.2 * height), 0.125 * width), (1.25 * width, 0.0, 0.0))
+    fan = Fan((left, depth, z + 0.2 * height), 0.125 * width, (1.25 * width, 0.0, 0.0))
     return {
         "wind": Continuation(1, wind=(0.4 * width, 0.0, 0.0)),
         "fan": Continuation(1, fans=(fan,)),
-        "ball": Continuation(1, obstacles=(Ball((middle, depth, z + 0.63 * height), 0.175 * width),)),
+        "ball": Continuation(1, obstacles=(ball((middle, depth, z + 0.63 * height), 0.175 * width),)),
     }
+
+
+def ball(center: tuple[float, float, float], radius: float) -> Mesh:
+    """Return a ball of triangles between 17 circles of latitude and 32 meridians."""
+    around = np.arange(33) % 32 * np.pi / 16
+    up = np.linspace(-np.pi / 2, np.pi / 2, 17)[:, None]
+    x, y, z = np.broadcast_arrays(np.cos(up) * np.cos(around), np.cos(up) * np.sin(around), np.sin(up))
+    points = np.array(center) + radius * np.stack([x, y, z], axis=-1)
+    a, b, c, d = points[:-1, :-1], points[:-1, 1:], points[1:, 1:], points[1:, :-1]
+    triangles = np.concatenate([np.stack([a, b, c], axis=-2), np.stack([a, c, d], axis=-2)])
+    return Mesh(triangles.reshape(-1, 3, 3).astype(np.float32))
 
 
 def left_by_a_face(sequence: Sequence, start: int) -> float:

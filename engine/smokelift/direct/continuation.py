@@ -25,7 +25,7 @@ from smokelift.direct.state import (
     write_copy,
     write_simulated,
 )
-from smokelift.direct.surroundings import Fan, Obstacle, Surroundings, Turbulence, require_place
+from smokelift.direct.surroundings import Fan, Surroundings, Turbulence, require_place
 from smokelift.output.archive import ResumeState
 from smokelift.output.sequence import Sequence
 from smokelift.output.writer import SequenceWriter
@@ -225,7 +225,7 @@ class Continuation:
     turbulences: tuple[Turbulence, ...] = ()
     """Eddies that all air gains after `start`."""
     fans: tuple[Fan, ...] = ()
-    obstacles: tuple[Obstacle, ...] = ()
+    obstacles: tuple[Mesh, ...] = ()
     """What stands there after `start`, in the clip's box or where it can grow to."""
     closed: tuple[Side, ...] = ()
     """Sides that are walls after `start`, besides those of the scene."""
@@ -261,7 +261,7 @@ def continue_sequence(
     for obstacle in continuation.obstacles:
         require_place("obstacle", obstacle, box, growth.reach())
     for fan in continuation.fans:
-        require_place("fan", fan.place, box, box)
+        require_place("fan", fan, box, box)
     for turbulence in continuation.turbulences:
         if turbulence.size < MIN_EDDY_VOXELS * box.voxel_size:
             raise ValueError(
@@ -275,8 +275,8 @@ def continue_sequence(
         **vars(continuation),
         "start": start,
         "turbulences": [asdict(turbulence) for turbulence in continuation.turbulences],
-        "fans": [vars(fan.place) | {"velocity": fan.velocity} for fan in continuation.fans],
-        "obstacles": [each.fingerprint() if isinstance(each, Mesh) else vars(each) for each in continuation.obstacles],
+        "fans": [asdict(fan) for fan in continuation.fans],
+        "obstacles": [obstacle.fingerprint() for obstacle in continuation.obstacles],
     }
     given = [name for name in ("buoyancy", "dissipation") if settings[name] is not None]
     made = Finding(
@@ -356,7 +356,7 @@ def _start_box(continuation: Continuation, growth: Growth) -> Domain:
     """The box in which the simulation begins: the clip's, and the fans."""
     box = growth.clip
     for fan in continuation.fans:
-        box = growth.around(box, Box(*fan.place.bounds()))
+        box = growth.around(box, Box(*fan.bounds()))
     return box
 
 

@@ -70,11 +70,14 @@ class Turbulence:
 
 
 @dataclass(frozen=True)
-class Ball:
-    """A round obstacle or, moving, a fan: its center and radius in meters."""
+class Fan:
+    """Air that is blown in a ball."""
 
     centre: Vector
     radius: float
+    """Of the ball, in meters."""
+    velocity: Vector
+    """That of the air, in m/s."""
 
     def voxels(self, domain: Domain) -> Mask:
         """The voxels whose centers lie in it, shape (nx, ny, nz)."""
@@ -85,27 +88,6 @@ class Ball:
         """The corners in meters of the box around it."""
         (x, y, z), r = self.centre, self.radius
         return (x - r, y - r, z - r), (x + r, y + r, z + r)
-
-
-@dataclass(frozen=True)
-class BoxObstacle:
-    """A box as obstacle, by its corners in meters."""
-
-    low: Vector
-    high: Vector
-
-    def voxels(self, domain: Domain) -> Mask:
-        """The voxels whose centers lie in it, shape (nx, ny, nz)."""
-        above, below = domain.offsets(self.low), domain.offsets(self.high)
-        x, y, z = ((a >= 0) & (b <= 0) for a, b in zip(above, below, strict=True))
-        return np.asarray(x & y & z)
-
-    def bounds(self) -> tuple[Vector, Vector]:
-        """Its corners in meters."""
-        return self.low, self.high
-
-
-Obstacle = Ball | BoxObstacle | Mesh
 
 
 class Solid(NamedTuple):
@@ -140,7 +122,7 @@ class Solid(NamedTuple):
         )
 
 
-def require_place(what: str, thing: Obstacle, domain: Domain, reach: Box) -> None:
+def require_place(what: str, thing: Fan | Mesh, domain: Domain, reach: Box) -> None:
     """Refuse a thing of that name that no smoke can meet, or a mesh that is open.
 
     It has to hold a voxel of the box at the start, or to stand where the box can grow to.
@@ -164,14 +146,6 @@ def _overlap(bounds: tuple[Vector, Vector], box: Box) -> bool:
     return all(a < d and b > c for a, b, c, d in zip(low, high, box.min, box.max, strict=True))
 
 
-@dataclass(frozen=True)
-class Fan:
-    """Air that is blown, in a ball, at a velocity in m/s."""
-
-    place: Ball
-    velocity: Vector
-
-
 @dataclass(frozen=True, eq=False)
 class Surroundings:
     """What acts on the smoke from outside."""
@@ -184,7 +158,7 @@ class Surroundings:
     """Eddies that all air gains, likewise."""
     fans: tuple[Fan, ...] = ()
     """In the box."""
-    obstacles: tuple[Obstacle, ...] = ()
+    obstacles: tuple[Mesh, ...] = ()
     """Through which nothing passes, in the box or outside it."""
     first: tuple[int, ...] = (0, 0, 0)
     """Voxel at which the box begins, counted from the clip's box: turbulence stays where it is when the box grows."""
@@ -201,7 +175,7 @@ class Surroundings:
     @cached_property
     def fan_faces(self) -> list[tuple[FaceMasks, Vector]]:
         """The faces of every fan's voxels, with its velocity in m/s."""
-        return [(faces_of(fan.place.voxels(self.domain)), fan.velocity) for fan in self.fans if self.domain is not None]
+        return [(faces_of(fan.voxels(self.domain)), fan.velocity) for fan in self.fans if self.domain is not None]
 
     def solid(self, step: int, dt: float) -> Solid | None:
         """What is solid after so many steps of `dt` seconds; None if nothing is, ValueError if it fills the box."""
@@ -209,7 +183,7 @@ class Surroundings:
             return None
         voxels, velocity = self._at_rest, None
         for obstacle in self.obstacles:
-            if isinstance(obstacle, Mesh) and obstacle.moves:
+            if obstacle.moves:
                 inside, speeds = obstacle.solid(self.domain, step, dt)
                 others = velocity or tuple(map(np.zeros_like, speeds))
                 x, y, z = (np.where(*three) for three in zip(faces_of(inside), speeds, others, strict=True))
@@ -223,6 +197,6 @@ class Surroundings:
         assert self.domain is not None
         voxels: Mask = np.zeros(self.domain.shape, bool)
         for obstacle in self.obstacles:
-            if not (isinstance(obstacle, Mesh) and obstacle.moves):
+            if not obstacle.moves:
                 voxels |= obstacle.voxels(self.domain)
         return voxels

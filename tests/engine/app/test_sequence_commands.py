@@ -15,6 +15,7 @@ from smokelift.footage.image_files import read_image
 from smokelift.output.images import eight_bit
 from smokelift.report import cost
 from smokelift.scene import Camera, Scene, orbit
+from tests.engine.direct.rising import cube, write_stl
 from tests.engine.output.small_sequence import needs_vdb
 
 
@@ -134,10 +135,10 @@ def test_one_sentence_says_what_stops_a_continuation(finished, tmp_path, capsys,
         ("loop", ("--frames", "2:4", "--overlap", 1), "more frames (4 at least)"),
         ("continue", ("--frames", 0), "--frames 0"),
         ("continue", ("--fade", 4), "--fade 4"),
-        ("continue", ("--ball", 0, 0, 1, -1), "radius"),
-        ("continue", ("--box", 50, 50, 50, 60, 60, 60), "no voxel"),
-        ("continue", ("--ball", 3, 0, 1, 0.5, "--room", 1), "the obstacle holds no voxel"),
-        ("continue", ("--ball", 0, 0, 1, 9), "fill the whole box"),
+        ("continue", ("--fan", 0, 0, 1, -1, 0, 0, 1), "radius"),
+        ("continue", ("--mesh", cube((50, 50, 50), (60, 60, 60))), "no voxel"),
+        ("continue", ("--mesh", cube((2.5, -0.5, 0.5), (3.5, 0.5, 1.5)), "--room", 1), "the obstacle holds no voxel"),
+        ("continue", ("--mesh", cube((-9, -9, -9), (9, 9, 9))), "fill the whole box"),
         ("continue", ("--fan", 0, 0, -1, 0.5, 0, 0, 1, "--closed", "z-"), "the fan holds no voxel"),
         ("continue", ("--room", 0.5), "--room 0.5"),
         ("continue", ("--dissipation", -1), "--dissipation -1"),
@@ -150,7 +151,11 @@ def test_one_sentence_says_what_stops_a_continuation(finished, tmp_path, capsys,
     ],
 )
 def test_what_cannot_be_made_of_a_sequence_is_refused(finished, tmp_path, capsys, verb, words, said) -> None:
-    words = [finished if word == "SELF" else word for word in words]
+    words = [finished if isinstance(word, str) and word == "SELF" else word for word in words]
+    for place, word in enumerate(words):
+        if isinstance(word, np.ndarray):
+            words[place] = tmp_path / "obstacle.stl"
+            write_stl(words[place], word)
     start = (verb, finished, "--out", tmp_path / "out", "--npz", *(("--frames", 3) if verb == "continue" else ()))
     assert said in refused(capsys, *start, *words)
     assert not (tmp_path / "out").exists()

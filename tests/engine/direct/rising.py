@@ -2,16 +2,20 @@
 
 from dataclasses import replace
 from functools import cache
+from itertools import product
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial import ConvexHull
 
 from smokelift import Domain, Sequence, Velocity
 from smokelift.direct.continuation import Continuation, continue_sequence
+from smokelift.direct.mesh import RECORD
 from smokelift.direct.simulation import Combustion, Inflow, Physics, Simulation
 from smokelift.direct.state import SmokeState
-from smokelift.direct.surroundings import Ball, Surroundings
+from smokelift.direct.surroundings import Surroundings
 from smokelift.output.writer import SequenceWriter
+from smokelift.scene import Inlet
 from tests.engine.output import small_sequence
 
 DOMAIN = Domain((-1, -1, 0), (1, 1, 3), (16, 16, 24))
@@ -57,7 +61,7 @@ def course(simulation: Simulation, state: SmokeState, frames: int) -> list[Smoke
 @cache
 def plume(burning: bool = False) -> tuple[SmokeState, ...]:
     """Smoke from an inlet, 1 s after it has begun; if it burns, with fire that is fed from there."""
-    inlet = Ball((0.0, 0.0, 0.3), 0.3).voxels(DOMAIN)
+    inlet = Inlet((0.0, 0.0, 0.3), 0.3).voxels(DOMAIN)
     faces = Velocity.zero(DOMAIN.shape, DOMAIN.voxel_size, ("z-",)).faces
     faces[2][:, :, 1:] = 1.0
     entering = SmokeState(inlet.astype(np.float32), Velocity(faces, DOMAIN.voxel_size, ("z-",)))
@@ -76,6 +80,41 @@ def write_plume(directory: Path, frames: int = 10, burning: bool = False) -> Non
     with SequenceWriter(directory, replace(SCENE, medium=medium), {"quality": "draft"}, npz=True) as writer:
         for number, state in enumerate(plume(burning)[:frames], 1):
             writer.write(number, state.density, state.velocity.faces, {"psnr": 30.0}, flame=state.flame)
+
+
+def hull(points) -> np.ndarray:
+    """The triangles around some points, with normals that point outwards."""
+    points = np.array(points, float)
+    found = ConvexHull(points)
+    corners = points[found.simplices]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    inwards = (normals * found.equations[:, :3]).sum(axis=1) < 0
+    corners[inwards] = corners[inwards, ::-1]
+    return corners.astype(np.float32)
+
+
+def cube(low, high) -> np.ndarray:
+    """The triangles of a box, by its corners."""
+    return hull(list(product(*zip(low, high, strict=True))))
+
+
+def octahedron(center, radius) -> np.ndarray:
+    """The triangles of an octahedron."""
+    return hull(np.array(center) + radius * np.concatenate([np.eye(3), -np.eye(3)]))
+
+
+def in_box(low, high) -> np.ndarray:
+    """The voxels whose centers lie in a box, by its corners."""
+    above, below = DOMAIN.offsets(low), DOMAIN.offsets(high)
+    x, y, z = ((a >= 0) & (b <= 0) for a, b in zip(above, below, strict=True))
+    return x & y & z
+
+
+def write_stl(path: Path, triangles: np.ndarray) -> None:
+    """Write a binary STL file."""
+    records = np.zeros(len(triangles), RECORD)
+    records["corners"] = triangles
+    path.write_bytes(bytes(80) + len(triangles).to_bytes(4, "little") + records.tobytes())
 
 
 def run(

@@ -18,10 +18,11 @@ from smokelift.direct.continuation import (
     moves,
 )
 from smokelift.direct.fitting import fit_fire, fit_simulation
+from smokelift.direct.mesh import Mesh
 from smokelift.direct.retiming import loop_sequence, retime_sequence
 from smokelift.direct.simulation import Combustion
 from smokelift.direct.state import SmokeState, open_source
-from smokelift.direct.surroundings import Ball, Surroundings, Turbulence
+from smokelift.direct.surroundings import Surroundings, Turbulence
 from smokelift.output.index import SequenceError
 from smokelift.output.sequence import Sequence
 from tests.engine.direct.rising import (
@@ -33,6 +34,7 @@ from tests.engine.direct.rising import (
     at_rest,
     blob,
     course,
+    octahedron,
     plume,
     run,
     run_twice,
@@ -71,7 +73,9 @@ def test_a_given_buoyancy_and_dissipation_count(source, tmp_path):
 
 
 def test_a_stopped_run_goes_on_to_the_same_result(source, tmp_path):
-    continuation = Continuation(5, start=8, fade=3, wind=(0.4, 0.0, 0.0), obstacles=(Ball((0, 0, 1.6), 0.3),))
+    continuation = Continuation(
+        5, start=8, fade=3, wind=(0.4, 0.0, 0.0), obstacles=(Mesh(octahedron((0, 0, 1.6), 0.4)),)
+    )
     whole, stopped = run_twice(source, tmp_path, continuation, 11)
     assert whole.frames == stopped.frames == tuple(range(1, 14))
     for number in whole.frames:
@@ -121,11 +125,11 @@ def test_fire_without_fuel_burns_out():
 
 
 def test_nothing_burns_in_an_obstacle():
-    ball = Ball((0.0, 0.0, 0.3), 0.4)
-    around = Surroundings(DOMAIN, obstacles=(ball,))
+    obstacle = Mesh(octahedron((0.0, 0.0, 0.3), 0.6))
+    around = Surroundings(DOMAIN, obstacles=(obstacle,))
     clip = plume(burning=True)
     after = fit_simulation(clip, DT, surroundings=around).next(clip[-1], 1)
-    assert not after.flame[ball.voxels(DOMAIN)].any()
+    assert not after.flame[obstacle.voxels(DOMAIN)].any()
 
 
 def test_the_feed_makes_no_more_fire_than_the_clip_has() -> None:

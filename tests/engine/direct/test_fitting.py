@@ -8,7 +8,7 @@ import pytest
 from smokelift.direct.fitting import coarsen_state, find_inflow, fit_simulation, inlet_score, spin_up
 from smokelift.direct.simulation import Inflow, Physics
 from smokelift.direct.state import SmokeState
-from smokelift.direct.surroundings import Ball
+from smokelift.scene import Inlet
 from smokelift.transport import Velocity
 from tests.engine.direct.rising import DOMAIN, DT, PHYSICS, at_rest, blob, course, free, plume
 
@@ -42,7 +42,7 @@ def test_a_head_that_dissolves_above_a_base_that_is_fed_rises():
         replace(state, density=(state.density * np.exp(-6 * DT * number * height)).astype(np.float32))
         for number, state in enumerate(plume())
     ]
-    assert fit_simulation(states, DT, Ball((0.0, 0.0, 0.3), 0.3).voxels(DOMAIN)).physics.buoyancy > 1
+    assert fit_simulation(states, DT, Inlet((0.0, 0.0, 0.3), 0.3).voxels(DOMAIN)).physics.buoyancy > 1
 
 
 @pytest.mark.parametrize("buoyancy", [3.0, -3.0])
@@ -81,7 +81,7 @@ def test_the_forces_of_a_clip_make_its_velocity_from_one_that_is_too_slow():
 
 @pytest.mark.parametrize(("factor", "difference", "left"), [(1.0, 0.1, 0.05), (-5.0, 0.2, 0.1)], ids=["right", "wrong"])
 def test_a_velocity_that_the_forces_explain_stays_and_one_estimated_wrong_does_not_go_on(factor, difference, left):
-    states, inlet = plume(), Ball((0.0, 0.0, 0.3), 0.3).voxels(DOMAIN)
+    states, inlet = plume(), Inlet((0.0, 0.0, 0.3), 0.3).voxels(DOMAIN)
     estimated = [slowed(states[0], factor), *states[1:]]
     simulation = fit_simulation(estimated, DT, inlet)
     assert simulation.physics.buoyancy == pytest.approx(PHYSICS.buoyancy, rel=difference)
@@ -114,9 +114,9 @@ def test_an_inlet_stands_out_from_motion_that_is_wrong_and_from_what_passes() ->
 
 def test_the_inlet_of_a_plume_is_found():
     found = find_inflow(plume(), DT).voxels
-    true = Ball((0.0, 0.0, 0.3), 0.3).voxels(DOMAIN)
+    true = Inlet((0.0, 0.0, 0.3), 0.3).voxels(DOMAIN)
     assert (found & true).sum() > 0.3 * true.sum()
-    far = ~Ball((0.0, 0.0, 0.3), 0.7).voxels(DOMAIN)
+    far = ~Inlet((0.0, 0.0, 0.3), 0.7).voxels(DOMAIN)
     assert not (found & far).any()
     for scale in np.float32([1e-3, 1e3]):
         scaled = [replace(state, density=scale * state.density) for state in plume()]
@@ -128,7 +128,7 @@ def test_what_only_moves_or_enters_at_changing_places_is_no_inlet() -> None:
     rest = at_rest(blob())
     grown = [rest.density]
     for place in (-0.5,) * 4 + (0.5,) * 4:
-        news = Ball((place, 0.0, 1.0), 0.3).voxels(DOMAIN)
+        news = Inlet((place, 0.0, 1.0), 0.3).voxels(DOMAIN)
         grown.append(grown[-1] + np.float32(0.2) * news)
     assert not find_inflow([replace(rest, density=density) for density in grown], DT).voxels.any()
 

@@ -1,53 +1,36 @@
 """Meshes as obstacles, still and moving: which voxels they enclose, how fast they are, and the files they come from."""
 
-from itertools import product
-
 import numpy as np
 import pytest
-from scipy.spatial import ConvexHull
 
 from smokelift.direct.continuation import Continuation, continue_sequence
-from smokelift.direct.mesh import HEADER, RECORD, Mesh
+from smokelift.direct.mesh import HEADER, Mesh
 from smokelift.direct.simulation import Physics
-from smokelift.direct.surroundings import BoxObstacle, Surroundings, require_place
+from smokelift.direct.surroundings import Surroundings, require_place
 from smokelift.output.index import SequenceError
 from smokelift.output.sequence import Sequence
 from smokelift.transport import divergence
 from smokelift.transport.pressure import faces_between
-from tests.engine.direct.rising import DOMAIN, DT, at_rest, blob, course, free
+from tests.engine.direct.rising import (
+    DOMAIN,
+    DT,
+    at_rest,
+    blob,
+    course,
+    cube,
+    free,
+    in_box,
+    octahedron,
+    write_stl,
+)
 
 H = DOMAIN.voxel_size
 
 
-def hull(points) -> np.ndarray:
-    """The triangles around some points, with normals that point outwards."""
-    points = np.array(points, float)
-    found = ConvexHull(points)
-    corners = points[found.simplices]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    inwards = (normals * found.equations[:, :3]).sum(axis=1) < 0
-    corners[inwards] = corners[inwards, ::-1]
-    return corners.astype(np.float32)
-
-
-def cube(low, high) -> np.ndarray:
-    return hull(list(product(*zip(low, high, strict=True))))
-
-
-def octahedron(center, radius) -> np.ndarray:
-    return hull(np.array(center) + radius * np.concatenate([np.eye(3), -np.eye(3)]))
-
-
-def written(path, triangles) -> None:
-    records = np.zeros(len(triangles), RECORD)
-    records["corners"] = triangles
-    path.write_bytes(bytes(80) + len(triangles).to_bytes(4, "little") + records.tobytes())
-
-
 def test_a_cube_is_the_box_of_its_corners():
     for low, high in (((-0.5, -0.3, 0.4), (0.7, 0.4, 2.1)), ((-0.4375, -0.5625, 0.5625), (0.4375, 0.5625, 1.4375))):
-        inside, wanted = Mesh(cube(low, high)).voxels(DOMAIN), BoxObstacle(low, high).voxels(DOMAIN)
-        at_faces = BoxObstacle([v + 0.01 for v in low], [v - 0.01 for v in high]).voxels(DOMAIN)
+        inside, wanted = Mesh(cube(low, high)).voxels(DOMAIN), in_box(low, high)
+        at_faces = in_box([v + 0.01 for v in low], [v - 0.01 for v in high])
         assert (inside <= wanted).all() and (inside >= at_faces).all()
 
 
@@ -62,8 +45,8 @@ def test_voxels_are_inside_whichever_way_the_triangles_turn(turned):
 def test_parts_of_a_mesh_may_overlap_and_leave_the_box():
     triangles = np.concatenate([cube((-0.5, -0.5, -1), (0.3, 0.5, 1)), cube((-0.1, -0.3, 0.5), (5, 0.3, 2))])
     inside = Mesh(triangles).voxels(DOMAIN)
-    one, other = BoxObstacle((-0.5, -0.5, -1), (0.3, 0.5, 1)), BoxObstacle((-0.1, -0.3, 0.5), (5, 0.3, 2))
-    np.testing.assert_array_equal(inside, one.voxels(DOMAIN) | other.voxels(DOMAIN))
+    one, other = in_box((-0.5, -0.5, -1), (0.3, 0.5, 1)), in_box((-0.1, -0.3, 0.5), (5, 0.3, 2))
+    np.testing.assert_array_equal(inside, one | other)
 
 
 def test_a_mesh_with_a_hole_works_and_a_plane_is_refused():
@@ -76,9 +59,9 @@ def test_a_mesh_with_a_hole_works_and_a_plane_is_refused():
 def test_an_stl_file_is_read_as_it_was_written(tmp_path):
     triangles = cube((-0.5, -0.3, 0.4), (0.7, 0.4, 2.1))
     path = tmp_path / "cube.stl"
-    written(path, np.full((1, 3, 3), np.nan))
+    write_stl(path, np.full((1, 3, 3), np.nan))
     not_a_number = path.read_bytes()
-    written(path, triangles)
+    write_stl(path, triangles)
     np.testing.assert_array_equal(Mesh.read(path).places, triangles[None])
     whole = path.read_bytes()
     wrong = (b"", b"solid cube\nendsolid", whole[:-1], whole + b"x", whole[:HEADER], bytes(HEADER), not_a_number)
@@ -142,7 +125,7 @@ def test_numbered_files_are_one_obstacle(source, tmp_path):
     with pytest.raises(ValueError):
         Mesh.read(pattern)
     for number, place in enumerate(moving.places, 9):
-        written(tmp_path / f"crate_{number:04d}.stl", place)
+        write_stl(tmp_path / f"crate_{number:04d}.stl", place)
     read = Mesh.read(pattern)
     np.testing.assert_array_equal(read.places, moving.places)
     out = tmp_path / "out"
@@ -160,7 +143,7 @@ def test_numbered_files_are_one_obstacle(source, tmp_path):
     (tmp_path / "crate_0010.stl").unlink()
     with pytest.raises(ValueError):
         Mesh.read(pattern)
-    written(tmp_path / "crate_0010.stl", moving.places[1, :-1])
+    write_stl(tmp_path / "crate_0010.stl", moving.places[1, :-1])
     with pytest.raises(ValueError):
         Mesh.read(pattern)
 

@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 
 from smokelift.direct.fitting import fit_simulation
+from smokelift.direct.mesh import Mesh
 from smokelift.direct.simulation import INTENSITY, Inflow, Physics, Simulation, small_eddy_speed, with_small_eddies
 from smokelift.direct.state import SmokeState
-from smokelift.direct.surroundings import Ball, Surroundings, Turbulence
+from smokelift.direct.surroundings import Surroundings, Turbulence
+from smokelift.scene import Inlet
 from smokelift.transport import Velocity, at_centres, divergence, project
-from tests.engine.direct.rising import DOMAIN, DT, PHYSICS, at_rest, blob, course, free, plume
+from tests.engine.direct.rising import DOMAIN, DT, PHYSICS, at_rest, blob, course, free, octahedron, plume
 
 STILL = Velocity.zero((40, 40, 40), 0.05)
 SHAPE = (32, 32, 40)
@@ -54,23 +56,23 @@ def test_wind_carries_the_smoke_along():
 
 
 def test_smoke_goes_round_an_obstacle():
-    ball = Ball((0.0, 0.0, 1.4), 0.35)
-    solid = ball.voxels(DOMAIN)
+    obstacle = Mesh(octahedron((0.0, 0.0, 1.4), 0.45))
+    solid = obstacle.voxels(DOMAIN)
     start = at_rest(np.where(solid, np.float32(0), blob()))
-    states = course(free(PHYSICS, Surroundings(DOMAIN, obstacles=(ball,))), start, 36)
+    states = course(free(PHYSICS, Surroundings(DOMAIN, obstacles=(obstacle,))), start, 36)
     for state in states[1:]:
         assert not state.density[solid].any()
         assert np.abs(divergence(state.velocity))[~solid].max() * DOMAIN.voxel_size < 0.02
-    above = 12  # the layer above the middle of the ball
+    above = 12  # the layer above the middle of the obstacle
     assert states[0].density[:, :, above:].sum() < 0.1 * mass(states[0])
     assert states[-1].density[:, :, above:].sum() > 0.3 * mass(states[-1])
     assert mass(states[-1]) / mass(states[0]) == pytest.approx(np.exp(-0.3 * 36 * DT), rel=0.01)
 
 
 def test_an_obstacle_closes_the_inlet_that_it_covers():
-    inlet = Ball((0.0, 0.0, 1.4), 0.3)
+    inlet = Inlet((0.0, 0.0, 1.4), 0.3)
     inflow = Inflow(inlet.voxels(DOMAIN), (at_rest(blob()),))
-    around = Surroundings(DOMAIN, obstacles=(Ball(inlet.centre, 0.4),))
+    around = Surroundings(DOMAIN, obstacles=(Mesh(octahedron(inlet.centre, 0.6)),))
     nothing = at_rest(np.zeros(DOMAIN.shape, np.float32))
     assert Simulation(PHYSICS, inflow, Surroundings(), DT).next(nothing, 1).density.any()
     assert not Simulation(PHYSICS, inflow, around, DT).next(nothing, 1).density.any()

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from smokelift.direct.state import SmokeState, complete_velocity, interpolate
-from smokelift.direct.surroundings import Ball
+from smokelift.scene import Inlet
 from smokelift.transport import Velocity, divergence, project
 from smokelift.transport.pressure import faces_of
 from tests.engine.direct.rising import DOMAIN, DT, along_x, at_rest, blob
@@ -46,7 +46,7 @@ def test_a_velocity_known_near_smoke_is_completed():
     for _ in range(6):  # eddies larger than voxels
         faces = [sum(np.roll(f, s, a) for a in range(3) for s in (-1, 1)) / np.float32(6) for f in faces]
     whole = project(Velocity((faces[0], faces[1], faces[2]), DOMAIN.voxel_size))
-    near = Ball((0, 0, 1.5), 0.7).voxels(DOMAIN)
+    near = Inlet((0, 0, 1.5), 0.7).voxels(DOMAIN)
     known = faces_of(near)
     cut = whole.with_faces(np.where(m, f, np.float32(0)) for m, f in zip(known, whole.faces, strict=True))
 

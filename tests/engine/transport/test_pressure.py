@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from smokelift import _core
-from smokelift.direct.surroundings import Ball, Solid
+from smokelift.direct.surroundings import Solid
+from smokelift.scene import Inlet
 from smokelift.transport import Velocity, divergence, project
 from smokelift.transport.pressure import faces_between, faces_of, project_with_given_faces
 from tests.engine.direct.rising import DOMAIN, along_x
@@ -89,7 +90,7 @@ def test_divergence_is_per_volume():
 
 
 def test_no_air_enters_an_obstacle_and_none_is_made_around_it():
-    solid = Ball((0, 0, 1.5), 0.5).voxels(DOMAIN)
+    solid = Inlet((0, 0, 1.5), 0.5).voxels(DOMAIN)
     found = Solid(solid, None).projected(along_x(1.0))
     assert not any(component[mask].any() for mask, component in zip(faces_of(solid), found.faces, strict=True))
     assert np.abs(divergence(found)).max() * DOMAIN.voxel_size < 0.005
@@ -99,7 +100,7 @@ def test_no_air_enters_an_obstacle_and_none_is_made_around_it():
 
 def test_the_force_of_an_obstacle_acts_on_its_surface_alone():
     """Elsewhere the field changes by a velocity without divergence only, which no projection would take away."""
-    field, solid = along_x(1.0), Ball((0, 0, 1.5), 0.5).voxels(DOMAIN)
+    field, solid = along_x(1.0), Inlet((0, 0, 1.5), 0.5).voxels(DOMAIN)
     still = Velocity.zero(DOMAIN.shape, DOMAIN.voxel_size).faces
     found = project_with_given_faces(field, faces_between(solid), still)
     again = project(Velocity(found.faces, field.voxel_size, field.closed))

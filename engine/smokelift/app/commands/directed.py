@@ -19,7 +19,7 @@ from smokelift.direct.retiming import (
     steady_part,
 )
 from smokelift.direct.state import Written, open_source
-from smokelift.direct.surroundings import Ball, BoxObstacle, Fan, Turbulence
+from smokelift.direct.surroundings import Fan, Turbulence
 from smokelift.output.index import INDEX, Index
 from smokelift.output.sequence import Sequence
 from smokelift.report.cost import affordable_room
@@ -55,10 +55,6 @@ def add_continue_options(parser: argparse.ArgumentParser) -> None:
         "--fan",
         ("X", "Y", "Z", "RADIUS", "VX", "VY", "VZ"),
         "a ball in which air is blown: center and radius in meters, velocity in m/s",
-    )
-    _add_repeatable(parser, "--ball", ("X", "Y", "Z", "RADIUS"), "a round obstacle, in meters")
-    _add_repeatable(
-        parser, "--box", ("X", "Y", "Z", "X2", "Y2", "Z2"), "an obstacle from one corner to the other, in meters"
     )
     parser.add_argument(
         "--mesh",
@@ -163,17 +159,14 @@ def _continuation(options: argparse.Namespace) -> Continuation:
         raise ValueError(f"--dissipation {options.dissipation:g}: expected 0 or more, in 1/s.")
     if options.room < 1:
         raise ValueError(f"--room {options.room:g}: expected 1 or more, in boxes of the clip.")
-    balls = [_ball("--ball", values) for values in options.ball]
-    corners = [zip(*(sorted(ends) for ends in zip(v[:3], v[3:], strict=True)), strict=True) for v in options.box]
-    boxes = [BoxObstacle(low, high) for low, high in corners]
     return Continuation(
         frames=options.frames,
         start=options.start,
         fade=options.fade,
         wind=tuple(options.wind),
         turbulences=tuple(_turbulence(*values) for values in options.turbulence),
-        fans=tuple(Fan(_ball("--fan", values[:4]), tuple(values[4:])) for values in options.fan),
-        obstacles=(*balls, *boxes, *map(Mesh.read, options.mesh)),
+        fans=tuple(_fan(*values) for values in options.fan),
+        obstacles=tuple(map(Mesh.read, options.mesh)),
         closed=tuple(side for side in SIDES if side in options.closed),
         room=options.room,
         buoyancy=options.buoyancy,
@@ -190,11 +183,10 @@ def _turbulence(speed: float, size: float, seed: float) -> Turbulence:
     return Turbulence(speed, size, int(seed))
 
 
-def _ball(option: str, values: list[float]) -> Ball:
-    x, y, z, radius = values
+def _fan(x: float, y: float, z: float, radius: float, *velocity: float) -> Fan:
     if radius <= 0:
-        raise ValueError(f"{option}: the radius must be above 0 m, not {radius:g}.")
-    return Ball((x, y, z), radius)
+        raise ValueError(f"--fan: the radius must be above 0 m, not {radius:g}.")
+    return Fan((x, y, z), radius, (velocity[0], velocity[1], velocity[2]))
 
 
 def add_retime_options(parser: argparse.ArgumentParser) -> None:

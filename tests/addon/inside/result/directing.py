@@ -16,9 +16,8 @@ from addon.scene.geometry import new_box
 from addon.scene.smoke import activate, smokes
 from conftest import changed, known_run
 from smokelift.direct.mesh import Mesh
-from smokelift.direct.surroundings import BoxObstacle
 from smokelift.output.sequence import Sequence
-from tests.engine.direct.rising import DOMAIN, write_plume
+from tests.engine.direct.rising import DOMAIN, in_box, write_plume
 from tests.example_shot import smoke
 
 FRAMES = 6
@@ -114,12 +113,12 @@ def test_meshes_are_obstacles(result, acting, tmp_path) -> None:
     """With their modifiers, also mirrored ones; those outside and the smoke's box count for nothing."""
     obj = cube(acting)
     acting.objects.link(result.smokelift.box)
-    wanted = BoxObstacle((-0.5, -0.5, 1.0), (0.5, 0.5, 2.0)).voxels(DOMAIN)
+    wanted = in_box((-0.5, -0.5, 1.0), (0.5, 0.5, 2.0))
     (content,) = directing.engine_request(result)[2]
     np.testing.assert_array_equal(solid(content, tmp_path), wanted)
     obj.scale.x = -0.5
     small = cube(acting, 0.25, (0.5, 0.0, 1.5), "Small")
-    both = wanted | BoxObstacle((0.25, -0.25, 1.25), (0.75, 0.25, 1.75)).voxels(DOMAIN)
+    both = wanted | in_box((0.25, -0.25, 1.25), (0.75, 0.25, 1.75))
     np.testing.assert_array_equal(solid(*directing.engine_request(result)[2], tmp_path), both)
     obj.hide_viewport = True
     assert solid(*directing.engine_request(result)[2], tmp_path).sum() < both.sum()
@@ -141,7 +140,7 @@ def test_meshes_that_move(shot, result, acting, tmp_path) -> None:
     assert shot.frame_current == before
     assert len(files) == 4  # at the start and 1, 2 and 3 frames later; then it stays
     assert files[0] == files[1]
-    wanted = BoxObstacle((0.25, -0.25, 1.25), (0.75, 0.25, 1.75)).voxels(DOMAIN)
+    wanted = in_box((0.25, -0.25, 1.25), (0.75, 0.25, 1.75))
     np.testing.assert_array_equal(solid(files[-1], tmp_path), wanted)
     assert bpy.ops.smokelift.direct() == {"FINISHED"}
     (run,) = smoke_takes.runs
