@@ -123,6 +123,27 @@ def radiance(values: Any, name: str) -> NDArray[np.float32]:
     return numbers(values, name)
 
 
+def densities(
+    values: Any, name: str, shape: tuple[int, ...] | None = None, largest: float = MAX_MAGNITUDE
+) -> NDArray[np.float32]:
+    """Return densities (nx, ny, nz), of a shape if one is given, as float32 in one piece.
+
+    It raises ValueError, with the name, if they have another shape, are not finite, or not from 0 to ``largest``.
+    """
+    array = numbers(values, name)
+    if array.ndim != 3 or 0 in array.shape or shape not in (None, array.shape):
+        expected = "be three-dimensional" if shape is None else f"have the shape {shape}"
+        raise ValueError(f"{name} must {expected}, not of shape {array.shape}; resample it.")
+    least, most = array.min(), array.max()  # NaN if any is
+    if not np.isfinite((least, most)).all():
+        raise ValueError(f"{name} holds densities that are not finite; set them to 0.")
+    if least < 0:
+        raise ValueError(f"{name} holds negative densities; set them to 0.")
+    if most > largest:
+        raise ValueError(f"{name} holds densities up to {most:g}; scale them to {largest:g} at most.")
+    return np.ascontiguousarray(array)
+
+
 def described(value: object) -> str:
     """Return what was given, in words: itself if it is short, else its kind."""
     if value is None or isinstance(value, bool | int | float | str | np.number):

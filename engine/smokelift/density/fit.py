@@ -13,7 +13,7 @@ from typing import Protocol
 import numpy as np
 
 import smokelift._core as _core
-from smokelift.checks import MAX_MAGNITUDE, Mask, listed, numbers, require_kind
+from smokelift.checks import Mask, densities, listed, require_kind
 from smokelift.density.depth_prior import DepthEstimate, RoundDepth
 from smokelift.density.descent import descend
 from smokelift.density.multiplicative import fit_multiplicative
@@ -24,7 +24,7 @@ from smokelift.extraction.given_background import background_picture, single_col
 from smokelift.extraction.plate import Plate
 from smokelift.render import Image, Volume, scene_optics
 from smokelift.render.device import products_on_one_thread
-from smokelift.scene import CompleteScene, Domain, Scene, completed
+from smokelift.scene import CompleteScene, Scene, completed
 from smokelift.scene.domain import box_around
 
 MIN_DENSITY = 1e-9
@@ -218,7 +218,7 @@ def reconstruct_density(
     own = Observation(complete.camera, image, plate)
     seen = ViewSet.of([_with_plate(each, complete) for each in (own, *views)], optics)
     if initial is not None:
-        initial = _checked_initial(initial, optics.domain)
+        initial = densities(initial, "The initial density", optics.domain.resolution)
     with products_on_one_thread():
         estimate = RoundDepth().estimate(seen)
         return GradientFit(settings or DensitySettings()).fit(seen, estimate, initial)
@@ -287,16 +287,3 @@ def fit_figures(views: ViewSet, residuals: Sequence[Image], iterations: int) -> 
         "iterations": float(iterations),
         "hull_share": np.count_nonzero(views.hull) / views.hull.size,
     }
-
-
-def _checked_initial(initial: Volume, domain: Domain) -> Volume:
-    initial = numbers(initial, "The initial density")
-    if initial.shape != domain.resolution:
-        raise ValueError(
-            f"The initial density must have the shape {domain.resolution}, not {initial.shape}; resample it."
-        )
-    if not np.isfinite(initial).all() or initial.min() < 0:
-        raise ValueError("The initial density must be finite and not negative; set other values to 0.")
-    if initial.max() > MAX_MAGNITUDE:
-        raise ValueError(f"The initial density must be {MAX_MAGNITUDE:g} at most, not {initial.max():g}.")
-    return initial

@@ -25,6 +25,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
 
+from smokelift.checks import densities
 from smokelift.checks.whole_files import atomic_path
 from smokelift.output.archive import FLAME
 from smokelift.scene import Domain
@@ -175,7 +176,7 @@ def write_vdb(
     negative; VdbUnavailable if there is no OpenVDB module, and OSError if the file cannot be written.
     """
     vdb = vdb_module()
-    rho = checked_volume(density, domain.shape, "density")
+    rho = densities(density, "density", domain.shape, np.inf)
     box = _around(rho > 0.0, VELOCITY_MARGIN)
     if velocity is not None:
         velocity = _checked_velocity(velocity, domain.shape)
@@ -188,7 +189,7 @@ def write_vdb(
         for slab, near in _near(rho_box, velocity, box):
             grids[host.velocity].copyFromArray(near, ijk=_index(slab, first))
     if flame is not None:
-        emission = checked_volume(flame, domain.shape, FLAME)
+        emission = densities(flame, FLAME, domain.shape, np.inf)
         box = _around(emission > 0.0, 0)
         grids[FLAME] = _fog(vdb, emission[box], _index(box, first))
     h = lattice.voxel_size
@@ -232,19 +233,6 @@ def write_proxy(
     fire = None if flame is None else block_means(flame, times)
     coarse_lattice = None if lattice is None else lattice.coarser(times)
     write_vdb(path, block_means(density, times), None, domain.coarser(times), flame=fire, lattice=coarse_lattice)
-
-
-def checked_volume(values: npt.ArrayLike, shape: tuple[int, int, int], name: str) -> Array:
-    """Return a volume as OpenVDB takes it, which silently scrambles arrays of any other layout or type.
-
-    It raises ValueError, with its name, if it has another shape, or holds values that are not finite or negative.
-    """
-    volume = np.ascontiguousarray(values, np.float32)
-    if volume.shape != shape:
-        raise ValueError(f"{name} {volume.shape} does not fit the domain's {shape} voxels")
-    if not finite(volume) or volume.min() < 0.0:
-        raise ValueError(f"{name} must be finite and not negative")
-    return volume
 
 
 def _fog(vdb: ModuleType, values: Array, corner: tuple[int, ...]) -> Any:

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy.typing as npt
 
-from smokelift.checks import counted
+from smokelift.checks import counted, densities
 from smokelift.checks.whole_files import atomic_path
 from smokelift.output.archive import FLAME, VELOCITY, ResumeState, write_arrays
 from smokelift.output.images import write_image
@@ -39,7 +39,7 @@ from smokelift.output.index import (
     json_value,
     proxy_path,
 )
-from smokelift.output.vdb import MIN_PROXY_VOXELS, VdbUnavailable, checked_volume, vdb_module, write_proxy, write_vdb
+from smokelift.output.vdb import MIN_PROXY_VOXELS, VdbUnavailable, vdb_module, write_proxy, write_vdb
 from smokelift.scene import Background, CompleteScene, Domain, scene_to_dict
 from smokelift.transport import Array, Faces, Velocity, require_same_shape
 
@@ -167,10 +167,10 @@ class SequenceWriter:
         if min(number, self._index.file_number(number)) < 0:
             raise ValueError(f"a frame's number, and that of its file, must not be negative, as of {number}")
         box = box or self._domain
-        rho = checked_volume(density, box.shape, "density")
+        rho = densities(density, "density", box.shape, math.inf)
         velocity = Velocity(velocity_faces, self._domain.voxel_size)
         require_same_shape("the velocity", velocity.shape, box.shape)
-        fire = None if flame is None else checked_volume(flame, box.shape, FLAME)
+        fire = None if flame is None else densities(flame, FLAME, box.shape, math.inf)
         own_box = {} if box == self._domain else {BOX: {"min": box.min, "max": box.max, "resolution": box.resolution}}
         self.state = None  # a run has gone on by now, and the arrays are large
         state = state or ResumeState(number, rho, velocity.faces)

@@ -6,7 +6,7 @@ from typing import overload
 import numpy as np
 import numpy.typing as npt
 
-from smokelift.checks import numbers, radiance, require_kind
+from smokelift.checks import densities, radiance, require_kind
 from smokelift.extraction.given_background import background_picture
 from smokelift.render.environment import sampled_lights
 from smokelift.render.renderer import Image, Optics, Renderer, Volume
@@ -139,22 +139,8 @@ def _of_view(density: Volume, renderer: Renderer, target: npt.ArrayLike) -> tupl
 
 
 def _checked(density: Volume, renderer: Renderer) -> Volume:
-    density = numbers(density, "The density")
-    domain = renderer.optics.domain
-    wanted = domain.resolution
-    if density.shape != wanted:
-        raise ValueError(f"The density has the shape {density.shape}, the domain {wanted}; resample one of them.")
-    if not np.isfinite(density).all():
-        raise ValueError("The density holds values that are not finite; set them to 0.")
-    if density.min(initial=0.0) < 0:
-        raise ValueError("The density holds negative values; set them to 0.")
-    depth = float(density.max(initial=0.0)) * renderer.optics.medium.extinction * domain.voxel_size
-    if depth > LARGEST_DEPTH:
-        raise ValueError(
-            f"The densest voxel has an optical depth of {depth:g}; {LARGEST_DEPTH:g} at most. Lower the density "
-            "or the extinction."
-        )
-    return density
+    domain, extinction = renderer.optics.domain, renderer.optics.medium.extinction
+    return densities(density, "The density", domain.resolution, LARGEST_DEPTH / (extinction * domain.voxel_size))
 
 
 def scene_optics(scene: CompleteScene) -> Optics:

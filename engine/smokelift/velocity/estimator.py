@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
 
-from smokelift.checks import MAX_MAGNITUDE, Mask, numbers, require_kind
+from smokelift.checks import Mask, densities, require_kind
 from smokelift.scene import Side
 from smokelift.scene.checks import set_fields
 from smokelift.scene.domain import checked_sides
@@ -60,8 +60,8 @@ class DensityPair:
     def __post_init__(self) -> None:
         require_positive("dt", self.dt)
         require_positive("voxel_size", self.voxel_size)
-        first, second = _density("before", self.before), _density("after", self.after)
-        require_same_shape("after", second.shape, first.shape)
+        first = densities(self.before, "before")
+        second = densities(self.after, "after", first.shape)
         require_kind(self.inflow, np.ndarray | None, "inflow", "an array of booleans, one per voxel")
         if self.inflow is not None:
             require_same_shape("inflow", self.inflow.shape, first.shape)
@@ -106,17 +106,3 @@ def motion_weight(shape: tuple[int, ...], inflow: Mask | None) -> Array:
     # blur and gradients take the change there one voxel further
     weight: Array = (~ndimage.binary_dilation(inflow)).astype(np.float32)
     return weight
-
-
-def _density(name: str, values: Density) -> Array:
-    values = numbers(values, name)
-    if values.ndim != 3 or 0 in values.shape:
-        raise ValueError(f"{name} must be a three-dimensional array, not one of shape {values.shape}.")
-    least, most = values.min(), values.max()  # NaN if any is
-    if not np.isfinite((least, most)).all():
-        raise ValueError(f"{name} holds densities that are not finite; set them to 0.")
-    if least < 0:
-        raise ValueError(f"{name} holds negative densities; set them to 0.")
-    if most > MAX_MAGNITUDE:
-        raise ValueError(f"{name} holds densities up to {most:g}; scale them to {MAX_MAGNITUDE:g} at most.")
-    return np.ascontiguousarray(values)

@@ -337,7 +337,7 @@ def test_a_view_of_another_size_or_that_moves_is_refused(plume, small) -> None:
         ({"image": np.full((42, 30, 3), np.nan)}, "not finite"),
         ({"image": np.zeros((30, 42, 3))}, r"\(42, 30, 3\)"),
         ({"image": np.zeros((42, 30))}, r"\(42, 30, 3\)"),
-        ({"initial": np.full((24, 24, 32), -1e-3)}, "not negative"),
+        ({"initial": np.full((24, 24, 32), -1e-3)}, "holds negative"),
         ({"initial": np.full((24, 24, 32), np.nan)}, "finite"),
         ({"initial": np.zeros((24, 24, 31))}, "shape"),
         ({"camera": None}, "no camera"),
