@@ -28,7 +28,6 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Unregister them."""
     from .scene.blender import unregister_modules
 
     unregister_modules(_modules())

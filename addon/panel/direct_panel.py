@@ -108,7 +108,6 @@ def direct(_context: bpy.types.Context, smoke: bpy.types.Object) -> None:
 
 
 def _may_act(context: bpy.types.Context, smoke: bpy.types.Object) -> list[bpy.types.Object]:
-    """The selected objects that may act on the smoke."""
     box = smoke.smokelift.box
     return [obj for obj in context.selected_objects if obj != box and obj.type in {*MESHES, "EMPTY"}]
 
@@ -169,8 +168,6 @@ def _draw_direct(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: 
 
 
 class ExportSettings:
-    """What is exported of a smoke."""
-
     folder: string("Folder", subtype="DIR_PATH", options=PATH_OPTIONS)(
         "Folder for the export; by default export_ and the program's name, beside the results"
     )

@@ -66,8 +66,6 @@ def _choose_color(context: bpy.types.Context, means: str) -> None:
 
 
 class SMOKELIFT_PT_strokes(bpy.types.Panel):
-    """The panel."""
-
     bl_label = "Smoke Strokes"
     bl_space_type = "IMAGE_EDITOR"
     bl_region_type = "UI"

@@ -106,8 +106,6 @@ def _draw_look(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bp
 
 
 class SetUpSettings:
-    """What Set Up Shot sets up."""
-
     set_up_range: tick("Size, Rate and Range", default=True)(
         "Give the scene the clip's resolution and frame rate, and the length of the result"
     )

@@ -55,7 +55,6 @@ def _ask_size() -> None:
 
 
 def folder_of(smoke: bpy.types.Object) -> Path:
-    """The folder for the export of a smoke."""
     chosen = smoke.smokelift_export.folder
     return absolute(chosen) if chosen else smoke_takes.output_folder(smoke) / f"export_{smoke.smokelift_export.host}"
 

@@ -68,7 +68,6 @@ def at_frame(scene: bpy.types.Scene, frame: int) -> Iterator[bpy.types.Depsgraph
 
 
 def frame_rate(scene: bpy.types.Scene) -> float:
-    """Frames a second of a scene."""
     return scene.render.fps / scene.render.fps_base
 
 

@@ -27,7 +27,6 @@ the depth to 0.165 of its half (docs/experiments/density-axis.md)."""
 
 
 def box_of(smoke: bpy.types.Object) -> bpy.types.Object | None:
-    """The box that holds the smoke."""
     return _in_scene(scene_of(smoke), smoke.smokelift.box)
 
 
@@ -43,7 +42,6 @@ def has_inlet(smoke: bpy.types.Object) -> bool:
 
 
 def box_corners(box: bpy.types.Object) -> list[Vector]:
-    """The eight corners of a box in the world."""
     return [box.matrix_world @ Vector(corner) for corner in box.bound_box]
 
 

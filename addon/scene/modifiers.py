@@ -30,12 +30,10 @@ class SecondVolume:
     socket: str  # input that is the second Volume's object, whose name ends so
 
     def modifier(self, smoke: bpy.types.Object) -> bpy.types.Modifier | None:
-        """The modifier of a smoke."""
         groups = ((each, each.node_group) for each in smoke.modifiers if each.type == "NODES")
         return next((modifier for modifier, group in groups if group is not None and group.get(self.mark)), None)
 
     def volume(self, smoke: bpy.types.Object) -> bpy.types.Volume | None:
-        """The second Volume of a smoke."""
         modifier = self.modifier(smoke)
         obj = _get_input(modifier, self.socket) if modifier is not None else None
         return obj.data if obj is not None else None

@@ -27,7 +27,6 @@ Described = Callable[[str], Input]  # makes an input of its tooltip
 
 
 def number(name: str, default: float = 0.0, low: float | None = None, high: float | None = None) -> Described:
-    """An input that is a number."""
     return lambda description: Input(name, "NodeSocketFloat", description, default, low, high)
 
 
@@ -37,7 +36,6 @@ def color(name: str, *default: float) -> Described:
 
 
 def empty_material(name: str) -> bpy.types.Material:
-    """A new material without nodes."""
     material = bpy.data.materials.new(name)
     if material.node_tree is None:  # since 5.0 there always is one
         material.use_nodes = True
@@ -114,7 +112,6 @@ def math_node(tree: Tree, operation: str, column: float, row: float, *values: An
 
 
 def vector_node(tree: Tree, operation: str, column: float, row: float, *values: Any) -> Socket:
-    """A vector of other vectors."""
     return add_node(tree, "ShaderNodeVectorMath", column, row, *values, operation=operation).outputs["Vector"]
 
 

@@ -33,7 +33,6 @@ def is_override(obj: bpy.types.Object | None) -> bool:
 
 
 def smokes(scene: bpy.types.Scene) -> list[bpy.types.Object]:
-    """The smokes of a scene."""
     return [obj for obj in scene.objects if is_smoke(obj)]
 
 

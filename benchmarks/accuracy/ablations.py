@@ -35,7 +35,7 @@ class EvenDepth:
         """Return the mean of the even densities of all views."""
         domain, hull = views.optics.domain, views.hull
         density = np.zeros(domain.resolution, np.float32)
-        even = [view.projection.read(view.optical_depth, hull) / thickness(view, domain) for view in views.views]
+        even = [view.projection.places(hull).read(view.optical_depth) / thickness(view, domain) for view in views.views]
         density[hull] = np.mean(even, axis=0) / views.optics.medium.extinction
         return DepthEstimate(density, tuple(np.ones_like(view.optical_depth) for view in views.views), views)
 

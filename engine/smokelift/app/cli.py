@@ -174,7 +174,6 @@ def _is_transient(error: BaseException | None) -> bool:
 
 
 def command_parser() -> argparse.ArgumentParser:
-    """Return the parser of the whole command line."""
     parser = _Parser(
         prog="smokelift", description="Turn a video of smoke into an OpenVDB sequence of density and velocity."
     )

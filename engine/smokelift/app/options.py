@@ -30,7 +30,6 @@ def named_path(text: str) -> Path:
 
 
 def add_device(parser: argparse.ArgumentParser) -> None:
-    """Add the device that renders."""
     parser.add_argument(
         "--device",
         choices=("auto", "cpu", "gpu"),
@@ -106,7 +105,6 @@ def add_run_options(parser: argparse.ArgumentParser) -> None:
 
 
 def add_sequence(parser: argparse.ArgumentParser) -> None:
-    """Add the sequence."""
     parser.add_argument("directory", type=named_path, help="directory of the sequence")
 
 

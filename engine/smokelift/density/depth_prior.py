@@ -195,7 +195,7 @@ def _common_axis(view: ObservedView, views: ViewSet) -> SmokeAxis:
     np.maximum.at(most, level, count)
     weight = (count == most[level]).astype(np.float64)  # those that fewer views show are known worse
     for other, visible in zip(views.views, shown, strict=True):
-        weight *= np.where(visible, other.projection.read(other.optical_depth, hull), 1)
+        weight *= np.where(visible, other.projection.places(hull).read(other.optical_depth), 1)
     total = np.bincount(level, weight)
     known = total > 0
     if not known.any():

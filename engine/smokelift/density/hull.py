@@ -56,10 +56,6 @@ class Projection:
         """Visible voxels (nx, ny, nz) whose nearest pixel is marked (rows, columns)."""
         return self.map.shown(marked)
 
-    def read(self, picture: NDArray[np.floating[Any]], voxels: Mask) -> Array:
-        """The picture (rows, columns) read at the marked voxels (n,); see `Places.read`."""
-        return self.places(voxels).read(picture)
-
 
 @lru_cache(maxsize=8)
 def project_voxels(camera: Camera, domain: Domain) -> Projection:

@@ -123,14 +123,11 @@ class Growth:
     def reach(self) -> Box:
         """The box that holds every box there can be."""
         times = self.voxels / math.prod(self.clip.resolution) - 1
-        low, high = list(self.clip.min), list(self.clip.max)
+        ends = np.array([self.clip.min, self.clip.max])
         for _, axis, is_high in open_sides(self.closed):
-            way = times * (self.clip.max[axis] - self.clip.min[axis])
-            if is_high:
-                high[axis] += way
-            else:
-                low[axis] -= way
-        return Box((low[0], low[1], low[2]), (high[0], high[1], high[2]))
+            ends[int(is_high), axis] += (1 if is_high else -1) * times * self.clip.size[axis]
+        low, high = ends.tolist()
+        return Box(tuple(low), tuple(high))
 
     def _fits(self, box: Domain) -> bool:
         small = math.prod(box.resolution) <= self.voxels and max(box.resolution) <= MAX_SIDE_VOXELS

@@ -56,7 +56,6 @@ class SmokeState:
 
 
 def read_state(sequence: Sequence, number: int) -> SmokeState:
-    """Read a frame of a sequence."""
     velocity = sequence.velocity(number)
     return SmokeState(sequence.density(number), complete_velocity(velocity), sequence.flame(number))
 

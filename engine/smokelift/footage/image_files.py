@@ -19,7 +19,7 @@ import struct
 import sys
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, redirect_stdout
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from fractions import Fraction
 from functools import lru_cache, partial
 from pathlib import Path
@@ -354,27 +354,31 @@ def _is_plain_tiff(path: Path, head: bytes) -> bool:
 
 
 @contextmanager
-def _silent() -> Iterator[None]:
-    """Silence what OpenEXR writes to standard output and error: the exception that follows says it."""
-    sys.stderr.flush()
-    kept = os.dup(2)
-    with Path(os.devnull).open("wb") as nowhere:
-        os.dup2(nowhere.fileno(), 2)
+def silenced() -> Iterator[None]:
+    """Silence what a library writes to standard output and error, which may carry JSON; its errors are exceptions."""
+    for stream in (sys.stdout, sys.stderr):
+        stream.flush()
+    kept = [os.dup(number) for number in (1, 2)]
     try:
-        with redirect_stdout(io.StringIO()):
+        with Path(os.devnull).open("wb") as nowhere:
+            for number in (1, 2):
+                os.dup2(nowhere.fileno(), number)
+        # Python's streams need not be those two: a notebook or a test has put others in their place
+        with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):
             yield
     finally:
-        os.dup2(kept, 2)
-        os.close(kept)
+        for number, copy in zip((1, 2), kept, strict=True):
+            os.dup2(copy, number)
+            os.close(copy)
 
 
 def _read_exr(path: Path) -> Layer:
-    with _silent():
+    with silenced():
         headers = OpenEXR.File(str(path), header_only=True).parts
     for part in headers:
         for name in ("displayWindow", "dataWindow"):
             require_size(path, _window(part, name)[1])
-    with _silent():
+    with silenced():
         parts = OpenEXR.File(str(path), separate_channels=True).parts
     if not parts:  # so the library reports damaged pixels
         raise ImageError(f"{path}: cannot be read: it is truncated or damaged")

@@ -40,7 +40,6 @@ class Similarity:
         return Similarity(1 / self.turn, -self.shift / self.turn)
 
     def moves(self, points: npt.NDArray[np.complex128]) -> npt.NDArray[np.complex128]:
-        """Return how far it moves points."""
         return (self.turn - 1) * points + self.shift
 
     def reach(self, width: int, height: int) -> float:

@@ -4,15 +4,13 @@ Taichi compiles the kernels for a GPU; on the processor it runs the paper's base
 There a device array is a NumPy array, which kernels use in place; on a GPU it is a Taichi array.
 """
 
-import io
 import os
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+from smokelift.footage.image_files import silenced
 
 os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")
 import taichi as ti
@@ -24,7 +22,7 @@ _running: str | None = None  # Taichi itself is one per process
 
 def supported_gpu() -> str | None:
     """Name of the first GPU back end that Taichi can use here, or None."""
-    with _silenced():
+    with silenced():
         for name, arch in GPU_BACKENDS.items():
             if ti.lang.misc.is_arch_supported(arch):
                 return name
@@ -52,7 +50,7 @@ def _initialize(arch: Any) -> None:
         where: dict[str, Any] = {"offline_cache_file_path": str(cache)}
     except OSError:
         where = {"offline_cache": False}  # in a shared folder others could put kernels for us
-    with _silenced():
+    with silenced():
         # exact operations: x != x must stay a test for NaN, and CPU and GPU should agree
         ti.init(arch=arch, default_fp=ti.f32, fast_math=False, log_level=ti.ERROR, **where)
 
@@ -90,22 +88,3 @@ def vector(values: np.ndarray[Any, Any]) -> Any:
 def download(array: Any) -> np.ndarray[Any, Any]:
     """The values of a device array; on the CPU the array itself, so copy before it is written again."""
     return array if isinstance(array, np.ndarray) else np.asarray(array.to_numpy())
-
-
-@contextmanager
-def _silenced() -> Iterator[None]:
-    """Taichi's greeting and its drivers' complaints go nowhere: output may carry JSON, errors are exceptions."""
-    for stream in (sys.stdout, sys.stderr):
-        stream.flush()
-    saved = [os.dup(number) for number in (1, 2)]
-    try:
-        with Path(os.devnull).open("wb") as nowhere:
-            for number in (1, 2):
-                os.dup2(nowhere.fileno(), number)
-        # Python's streams need not be those two: a notebook or a test has put others in their place
-        with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):
-            yield
-    finally:
-        for number, copy in zip((1, 2), saved, strict=True):
-            os.dup2(copy, number)
-            os.close(copy)

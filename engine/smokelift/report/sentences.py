@@ -414,7 +414,6 @@ SHORT: Mapping[str, str] = {
 
 
 def sentence(finding: Finding) -> str:
-    """Return a finding in words."""
     words = _filled(SENTENCES[finding.kind], finding)
     return f"View {finding.figures['view']}: {words}" if "view" in finding.figures else words
 

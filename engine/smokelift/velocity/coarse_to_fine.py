@@ -146,7 +146,6 @@ def _found(pair: DensityPair, given: Velocity | None, settings: VelocitySettings
 
 
 def _half(pair: DensityPair) -> DensityPair:
-    """The pair on a grid half as fine."""
     inflow = None if pair.inflow is None else coarsen_density(pair.inflow.astype(np.float32)) > 0
     before, after = coarsen_density(pair.before), coarsen_density(pair.after)
     return replace(pair, before=before, after=after, voxel_size=2 * pair.voxel_size, inflow=inflow)

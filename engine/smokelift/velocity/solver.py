@@ -43,7 +43,6 @@ class ProjectedCG:
     iterations: int = 10
 
     def solve(self, problem: _core.LeastSquares, start: StaggeredGrid) -> tuple[StaggeredGrid, _core.Figures]:
-        """See `Solver`."""
         faces, figures = problem.projected_cg(start.faces, tolerance=self.tolerance, limit=self.iterations)
         return start.with_faces(faces), figures
 
@@ -68,7 +67,6 @@ class PrimalDual:
     residual."""
 
     def solve(self, problem: _core.LeastSquares, start: StaggeredGrid) -> tuple[StaggeredGrid, _core.Figures]:
-        """See `Solver`."""
         # the two parts are coupled by the identity, whose norm is one; NaN is refused as well
         if not (self.sigma > 0 and self.tau > 0 and self.sigma * self.tau <= 1 and 0 <= self.theta <= 1):
             raise ValueError(

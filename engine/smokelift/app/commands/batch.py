@@ -60,7 +60,6 @@ class Remaining(NamedTuple):
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add the options of the command."""
     parser.add_argument("list", type=named_path, help="list of shots, such as shots.toml")
     parser.add_argument("--plan", action="store_true", help="say only what is left and how long it will take")
     parser.add_argument(

@@ -54,7 +54,6 @@ CHECKER = (0.05, 0.25)
 
 
 def add_reconstruct_options(parser: argparse.ArgumentParser) -> None:
-    """Add the options of the command."""
     add_run_options(parser)
     parser.add_argument("--out", type=named_path, required=True, help="directory for the sequence")
     parser.add_argument("--npz", action="store_true", help="write NumPy files as well")
@@ -143,7 +142,6 @@ def _write_thumbnail(path: Path, shot: Shot, frame: pipeline.Frame) -> None:
 
 
 def add_extract_options(parser: argparse.ArgumentParser) -> None:
-    """Add the options of the command."""
     add_clip_options(parser)
     parser.add_argument(
         "--out",
@@ -206,7 +204,6 @@ def _write_preview(path: Path, extraction: pipeline.Extraction) -> None:
 
 
 def add_inspect_options(parser: argparse.ArgumentParser) -> None:
-    """Add the options of the command."""
     add_run_options(parser)
     parser.add_argument(
         "--page",

@@ -33,7 +33,6 @@ SPEEDS = 0.01, 100.0
 
 
 def add_continue_options(parser: argparse.ArgumentParser) -> None:
-    """Add the options of ``continue``."""
     add_directed_options(parser)
     parser.add_argument("--frames", type=int, required=True, metavar="N", help="number of frames to add")
     parser.add_argument(
@@ -190,7 +189,6 @@ def _fan(x: float, y: float, z: float, radius: float, *velocity: float) -> Fan:
 
 
 def add_retime_options(parser: argparse.ArgumentParser) -> None:
-    """Add the options of ``retime``."""
     add_directed_options(parser)
     parser.add_argument(
         "--speed",
@@ -216,7 +214,6 @@ def retime(options: argparse.Namespace, say: Reporter) -> None:
 
 
 def add_loop_options(parser: argparse.ArgumentParser) -> None:
-    """Add the options of ``loop``."""
     add_directed_options(parser)
     parser.add_argument(
         "--frames",

@@ -55,7 +55,6 @@ def check(options: argparse.Namespace, say: Reporter) -> None:
 
 
 def add_preview_options(parser: argparse.ArgumentParser) -> None:
-    """Add the options of ``preview``."""
     add_sequence(parser)
     parser.add_argument("--out", type=named_path, help="directory for these files (default: the sequence's own)")
 
@@ -83,7 +82,6 @@ def proxy(options: argparse.Namespace, say: Reporter) -> None:
 
 
 def add_evaluate_options(parser: argparse.ArgumentParser) -> None:
-    """Add the options of ``evaluate``."""
     add_sequence(parser)
     parser.add_argument("--truth", type=named_path, metavar="truth.npz", help="known densities and velocities")
     parser.add_argument(
@@ -122,7 +120,6 @@ def compare(options: argparse.Namespace, say: Reporter) -> None:
 
 
 def add_render_options(parser: argparse.ArgumentParser) -> None:
-    """Add the options of the command."""
     add_sequence(parser)
     parser.add_argument(
         "--frame", type=int, metavar="N", help="the only frame (default: the first for an image, all for a video)"
@@ -180,7 +177,6 @@ def _camera(name: str, scene: CompleteScene) -> Camera:
 
 
 def add_export_options(parser: argparse.ArgumentParser) -> None:
-    """Add the options of the command."""
     add_sequence(parser)
     parser.add_argument("--out", type=named_path, required=True, help="folder for the export")
     parser.add_argument(
