@@ -90,7 +90,8 @@ def require_fitting_zip() -> None:
 class Job:
     """One run of the engine by a command, all of whose messages are appended to a log.
 
-    So many frames of the clip lie ``before`` the first of the result. A run that is resumed has ``done`` some already.
+    ``before`` is the number of the clip's frames before the first of the result, ``done`` of those that a resumed run
+    has finished already.
     """
 
     def __init__(self, command: Sequence[str], log: Path, before: int = 0, done: int = 0) -> None:

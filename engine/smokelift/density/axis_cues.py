@@ -1,12 +1,12 @@
 """Where in depth the smoke of one camera stands, by what shows it.
 
-One picture of smoke looks the same whether the smoke is near and small or far and large. Four cues show its place:
+One picture of smoke looks the same whether the smoke is near and small or far and large. Three cues show its place:
 
 - the box, which is put around its smoke: the mean depth is about its middle;
 - the base, where a column begins: a given distance or a marked inlet says its depth, else its contact with the floor;
-- the way up: a column that drifts across the picture drifts as far in depth, but nobody knows where to: there the box
-  alone speaks;
 - the ceiling, where smoke reaches it and none shows above: rays over the middle of it meet only what stands nearer.
+
+A column that drifts across the picture drifts as far in depth, but nobody knows where to.
 
 Several cameras need none of them: `depth_prior` reads the axis from what they have in common.
 docs/experiments/density-axis.md has the worth of each cue.

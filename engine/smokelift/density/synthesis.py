@@ -25,8 +25,8 @@ from smokelift.density.lattice_noise import SMALLEST_BLUR, Wander, stretched_noi
 from smokelift.density.multiplicative import fit_multiplicative, take_turns
 from smokelift.density.objective import FAINT, TINY, Level
 from smokelift.density.observation import ObservedClip, ViewSet
-from smokelift.density.texture import ClipTexture, Exemplar, Picture, enlarged, fine_energy
-from smokelift.density.turntable import Turntable, UprightSmoke
+from smokelift.density.texture import ClipTexture, Exemplar, enlarged, fine_energy
+from smokelift.density.turntable import DepthMap, Turntable, UprightSmoke
 from smokelift.render import Volume
 from smokelift.scene import Camera
 from smokelift.scene.domain import box_around
@@ -202,7 +202,7 @@ class EveryView:
                 density = take_turns(cameras, changed, self.level.views.where)
         return density
 
-    def _sharpened(self, density: Volume, exemplar: Exemplar, sides: Sequence[Picture]) -> Volume:
+    def _sharpened(self, density: Volume, exemplar: Exemplar, sides: Sequence[DepthMap]) -> Volume:
         """A density whose finest octave is stronger, or weaker, by what its sides lack of the clip's detail.
 
         Steps along whole rays hardly reach it, and advection smooths it.
@@ -222,7 +222,7 @@ class EveryView:
         exemplar: Exemplar,
         azimuth: tuple[int, float],
         relaxation: float,
-    ) -> Picture:
+    ) -> DepthMap:
         """Scale smoke (upright, a part of the domain) along the rays of one azimuth towards the clip's texture.
 
         Its picture before that is returned.
@@ -258,7 +258,7 @@ class EveryView:
                 yield turn, degrees
 
 
-def isotropic_filter(picture: Picture) -> Picture:
+def isotropic_filter(picture: DepthMap) -> DepthMap:
     """Filter what is laid along the rays of one azimuth, so that the sum over many has no level layers.
 
     What changes smoke alike along level rays has no detail along them: its Fourier transform lies in the plane through

@@ -26,12 +26,9 @@ import smokelift._core as _core
 from smokelift.checks import Mask
 from smokelift.density.lattice_noise import LARGEST_BLUR, SMALLEST_BLUR
 from smokelift.density.observation import ObservedClip, ObservedView
-from smokelift.density.turntable import Turntable
+from smokelift.density.turntable import DepthMap, Turntable
 from smokelift.scene import Camera, Domain
 from smokelift.transport import block_means
-
-Picture = NDArray[np.float32]
-"""Optical depth (columns, voxels along the axis) on the upright plane of a turntable, or the like."""
 
 SIZE = 7
 """Pixels along a patch's side. With one scale for each factor of two, patches of neighboring scales overlap widely."""
@@ -138,7 +135,7 @@ class _Shown(NamedTuple):
     """What a camera saw, on the upright plane of the turntable before it."""
 
     turntable: Turntable
-    picture: Picture
+    picture: DepthMap
 
 
 def _seen(clip: ObservedClip, number: int) -> list[tuple[Camera, NDArray[np.float32]]]:
@@ -177,14 +174,14 @@ def _motion(pairs: Sequence[tuple[Sequence[_Shown], Sequence[_Shown]]]) -> NDArr
     return np.asarray(np.linalg.lstsq(normal, change, rcond=None)[0])
 
 
-def _width(picture: Picture) -> float:
+def _width(picture: DepthMap) -> float:
     """Standard deviation (columns) of a picture's smoke about the middle of its row."""
     columns, row_sums = np.arange(len(picture)), np.maximum(picture.sum(0), 1e-30)
     middles = columns @ picture / row_sums
     return float(np.sqrt(np.sum(picture * (columns[:, None] - middles) ** 2) / picture.sum()))
 
 
-def roughness(pictures: Sequence[Picture], width: float) -> tuple[float, ...]:
+def roughness(pictures: Sequence[DepthMap], width: float) -> tuple[float, ...]:
     """Standard deviation of the logarithm of some smoke's density by octave, the coarsest first.
 
     The pictures are optical depths, one pixel per voxel; the smoke is ``width`` voxels wide (standard deviation across
@@ -196,7 +193,7 @@ def roughness(pictures: Sequence[Picture], width: float) -> tuple[float, ...]:
     return tuple(float(np.sqrt(np.log1p(_energy(pictures, blur) / _unit_energy(blur, width)))) for blur in blurs)
 
 
-def _energy(pictures: Sequence[Picture], blur: float) -> float:
+def _energy(pictures: Sequence[DepthMap], blur: float) -> float:
     """Mean square of the detail between a blur (deviation, pixels) and half of it, over the blurred smoke's."""
     scale = 1
     while blur / (2 * scale) >= FINE_ENOUGH:
@@ -209,7 +206,7 @@ def _energy(pictures: Sequence[Picture], blur: float) -> float:
     return square / total
 
 
-def fine_energy(pictures: Sequence[Picture]) -> float:
+def fine_energy(pictures: Sequence[DepthMap]) -> float:
     """Mean square of the pictures' finest octave of detail, over the blurred smoke's, as smoke in depth has it.
 
     The Fourier transform of a picture is a plane through the vertical of the smoke's own. So its waves stand for the
@@ -225,7 +222,7 @@ def fine_energy(pictures: Sequence[Picture]) -> float:
     return square / total if total > 0 else 0.0
 
 
-def _octave(picture: Picture, blur: float) -> tuple[Picture, Picture, Mask]:
+def _octave(picture: DepthMap, blur: float) -> tuple[DepthMap, DepthMap, Mask]:
     """A picture's detail between a blur (deviation, pixels) and half of it, the picture so blurred, and its body."""
     fine, coarse = (ndimage.gaussian_filter(picture, each) for each in (blur / 2, blur))
     return fine - coarse, coarse, coarse > BODY * coarse.max()
@@ -257,7 +254,7 @@ class Exemplar:
     """(bases, n, knots): of the patches along each direction, ascending."""
 
     @staticmethod
-    def of(pictures: Sequence[Picture], scale: int) -> Exemplar:
+    def of(pictures: Sequence[DepthMap], scale: int) -> Exemplar:
         """Take the patches of pictures that show smoke, and of their mirror images."""
         fullest = max(pictures, key=lambda picture: float(picture.sum(dtype=np.float64)))
         unit = UNIT * float(np.percentile(fullest[fullest > 0], 95))
@@ -283,7 +280,7 @@ class Exemplar:
         energy = fine_energy([block_means(picture, scale) for picture in pictures])
         return Exemplar(scale, unit, height, directions, energy, np.ascontiguousarray(quantiles, np.float32))
 
-    def towards(self, picture: Picture, turn: int) -> Picture:
+    def towards(self, picture: DepthMap, turn: int) -> DepthMap:
         """A picture at this scale, its patches moved to the exemplar's quantiles; where they overlap their mean counts.
 
         ``turn`` chooses the directions.
@@ -301,7 +298,7 @@ class Exemplar:
         return np.asarray(self.unit * np.expm1(v), np.float32)
 
 
-def _patches(v: Picture, height: float) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+def _patches(v: DepthMap, height: float) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
     """Patches (n, count) about pixels near smoke, with their height; and their places (2, count) in v, padded."""
     linear, reach = np.expm1(v), SIZE // 2
     least = MIN_DEPTH * linear.max()
@@ -313,7 +310,7 @@ def _patches(v: Picture, height: float) -> tuple[NDArray[np.float32], NDArray[np
     return np.concatenate([pixels, place[None].astype(np.float32)]), at + reach
 
 
-def enlarged(picture: Picture, scale: int, shape: tuple[int, int]) -> Picture:
+def enlarged(picture: DepthMap, scale: int, shape: tuple[int, int]) -> DepthMap:
     """The inverse of `block_means`, to a shape, linear between the blocks' middles."""
     columns, voxels = shape
     large = ndimage.zoom(picture, scale, order=1, mode="nearest", grid_mode=True)

@@ -15,8 +15,8 @@ from smokelift.density.upright_plane import seen_at, view_frame
 from smokelift.scene import Camera, Domain, as_matrix
 
 Volume = NDArray[np.float32]
-Picture = NDArray[np.float32]
-"""(columns, voxels along the axis), one pixel per voxel, upwards."""
+DepthMap = NDArray[np.float32]
+"""Optical depth, or the like, (columns, voxels along the axis): one pixel per voxel, upwards."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +74,7 @@ class Turntable:
         back = np.array(camera.matrix)[:3, 2]
         return float(np.degrees(np.arctan2(back @ self.lateral, -(back @ self.depth))))
 
-    def on_plane(self, picture: Array, camera: Camera) -> Picture:
+    def on_plane(self, picture: Array, camera: Camera) -> DepthMap:
         """Put a camera's picture (rows, columns) on the plane; zero where it shows nothing."""
         columns, voxels = self.shape
         h = self.domain.voxel_size
@@ -115,11 +115,11 @@ class UprightSmoke(NamedTuple):
     def of(table: Turntable, values: Volume, corner: tuple[int, int] = (0, 0)) -> UprightSmoke:
         return UprightSmoke(table, values, corner, _core.filled_spans(values))
 
-    def picture(self, degrees: float) -> Picture:
+    def picture(self, degrees: float) -> DepthMap:
         """Sums (columns, voxels along the axis) along the rays of a turned view."""
         return _core.project_turned(self.values, self.spans, *self._turned(degrees), self.table.shape[0])
 
-    def scale(self, logarithm: Picture, degrees: float) -> None:
+    def scale(self, logarithm: DepthMap, degrees: float) -> None:
         """Multiply the smoke along the rays of a turned view by exponentials of a picture."""
         _core.scale_turned(self.values, self.spans, *self._turned(degrees), logarithm)
 

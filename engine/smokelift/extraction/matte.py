@@ -132,12 +132,12 @@ def matte(frame: npt.ArrayLike, plate: Plate) -> Matte:
 
 
 def certainty(deviation: Picture, width: float, shared: Picture | float = 0.0) -> Picture:
-    """Return the probability (rows, columns) that a pixel shows smoke, by its deviation in units of noise.
+    """Return how certainly a pixel shows smoke (rows, columns), by its deviation in units of noise.
 
-    It is 0 but in patches above `MIN_DEVIATION` that noise makes too rarely. ``width`` is the standard deviation, in
-    pixels, of the Gaussian that smoothed the deviation. ``shared`` is that of noise that a patch of any size shares, in
-    the deviation's units. The probability of a patch of noise is the product of its samples' probabilities to deviate
-    as far, and of that of the shift by shared noise that makes it largest.
+    From 0 at `MIN_DEVIATION` to 1 at `FULL_DEVIATION`, and 0 in patches that noise makes often enough. ``width`` is the
+    standard deviation, in pixels, of the Gaussian that smoothed the deviation. ``shared`` is that of noise that a patch
+    of any size shares, in the deviation's units. The probability of a patch of noise is the product of its samples'
+    probabilities to deviate as far, and of that of the shift by shared noise that makes it largest.
     """
     patches, count = ndimage.label(deviation > MIN_DEVIATION, structure=np.ones((3, 3)))
     inside, sample = patches > 0, 4 * np.pi * width**2

@@ -174,7 +174,7 @@ def frames_after(before: CarriedState | None, shot: Shot, method: Method) -> Ite
     with products_on_one_thread():
         method = replace(method, depth_prior=method.depth_prior.of_clip(shot))
         if before is not None and flow:  # a run that goes on: its state has no picture
-            before = replace(before, picture=_flow_picture(_seen(before.number - 1, shot)))
+            before = replace(before, picture=_flow_picture(_observed(before.number - 1, shot)))
     first: tuple[Frame, CarriedState] | None = None
     for index in range(before.number if before else 0, count):
         with products_on_one_thread():
@@ -199,7 +199,7 @@ def _frame(
     # from where there was no smoke nothing is carried
     if before is not None and index >= 2 and before.density.any():
         predicted = method.velocity_estimator.predict(before.velocity, dt)
-    views = _seen(index, shot)
+    views = _observed(index, shot)
     fitted, taken_over = _density(views, before, predicted, shot, method)
     picture = _flow_picture(views) if flow else None
     flame = _flame(index, fitted.density, shot)
@@ -236,7 +236,7 @@ def _frame(
     )
 
 
-def _seen(index: int, shot: Shot) -> ViewSet | None:
+def _observed(index: int, shot: Shot) -> ViewSet | None:
     """What the cameras saw in a frame, counted from 0; None if nothing of the domain."""
     observations = shot.observe(index)
     return ViewSet.of(observations, shot.optics, index) if observations else None

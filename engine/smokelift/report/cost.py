@@ -78,7 +78,8 @@ TIMED_GRID, TIMED_SOLVES = (64, 64, 64), 40
 """Voxels of the grid whose solve is timed, and how often: the processor's clock of some systems counts in 16 ms."""
 
 WORKERS = 2
-"""Threads of a run, which share the processor time of a solve (by hand)."""
+"""Threads that a forecast assumes to share the processor time of a solve, whatever a run may use: times were measured
+on two cores (by hand)."""
 
 BYTES_PER_SIMULATED_VOXEL = 170
 """Bytes at the peak for each voxel of a box in which smoke is simulated (measured: 161 in one of 2.4 million with a

@@ -1,8 +1,8 @@
 """The words of findings: a sentence, a line of a table and JSON, from the kinds of findings and their figures.
 
-This is the only place of the words. They fill in the figures of their finding, as `str.format` does; also ``about``,
-``value`` and ``spread``. There are formats of their own: a noun is counted, and "place" says a depth in words. Tuples
-are joined by " x " if they are whole numbers or their format ends with " x", else by commas.
+The engine has no other words of findings. They fill in the figures of their finding, as `str.format` does; also
+``about``, ``value`` and ``spread``. There are formats of their own: a noun is counted, and "place" says a depth in
+words. Tuples are joined by " x " if they are whole numbers or their format ends with " x", else by commas.
 """
 
 from collections.abc import Iterable, Mapping

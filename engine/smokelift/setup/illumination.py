@@ -1,7 +1,7 @@
 """The medium that a shot's smoke is, what color it has, the light, and how the smoke scatters it.
 
     what the scene gives, or the color of the smoke's pixels -> the medium                              find_medium
-    what the scene gives, or the smoke's source radiance -> a light, the richest scattering it allows   first_light
+    what the scene gives, or the smoke's source radiance -> a light, the richest scattering it allows   find_light
     coarse densities in it -> the cheapest scattering that is as good                                   find_scattering
 
 The last is judged by `coarse.held_out`. Figures: docs/selection.md, docs/experiments/unknown-light.md.
@@ -69,7 +69,7 @@ MAX_ERROR_RATIO = 0.75
 """Error of multiple over single scattering, below which multiple is taken. It is 0.01 to 0.63 for traced paths, unless
 either model fits, and from 0.82 for light scattered once (docs/experiments/scattering.md)."""
 
-MAX_DESCENT_STEPS = 64
+MIN_DESCENT_STEPS = 64
 """Steps of descent of a fit where models differ little: enough for every fit to end by itself. One that is cut off has
 the error of the steps that it lacks (docs/experiments/scattering.md)."""
 
@@ -230,7 +230,7 @@ def _degrees(colors: Doubles, other: Doubles) -> Doubles:
     return np.asarray(np.degrees(np.arccos(np.clip(colors @ other / np.maximum(length, 1e-12), -1, 1))))
 
 
-def first_light(
+def find_light(
     lights: tuple[Light, ...],
     scattering: Scattering | None,
     geometry: Geometry,
@@ -321,7 +321,7 @@ def find_scattering(
         # the errors may be the coarse grid's: either model seems to fit, or neither
         if alike and (larger := finer()) is not None and larger.scene.domain != frames[0].scene.domain:
             frames = [larger]
-            fit = replace(fit, descent_iterations=max(MAX_DESCENT_STEPS, fit.descent_iterations))
+            fit = replace(fit, descent_iterations=max(MIN_DESCENT_STEPS, fit.descent_iterations))
             errors = {each: held_out(frames, each, each, fit).error for each in candidates}
         if errors["multiple"] < MAX_ERROR_RATIO * errors["single"]:
             richest = "multiple"

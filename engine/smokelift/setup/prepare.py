@@ -17,7 +17,7 @@ from smokelift.setup.coarse import coarse_frame, coarse_frames
 from smokelift.setup.first_estimate import FirstEstimate, first_estimate, first_findings, is_given
 from smokelift.setup.further_views import disagreement, open_views
 from smokelift.setup.geometry import find_geometry
-from smokelift.setup.illumination import find_medium, find_scattering, first_light, light_doubts
+from smokelift.setup.illumination import find_light, find_medium, find_scattering, light_doubts
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot, ShotView
 from smokelift.velocity.pyramid import COARSEST_SIDE, default_coarsening
@@ -55,7 +55,7 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
     camera, domain = geometry.camera, geometry.domain
     medium, of_medium = find_medium(scene, estimate, camera, domain)
     asked = scene.scattering if settings.scattering == "auto" else settings.scattering
-    lights, richest, of_light = first_light(scene.lights, asked, geometry, medium, estimate)
+    lights, richest, of_light = find_light(scene.lights, asked, geometry, medium, estimate)
     complete = CompleteScene(
         camera=camera,
         domain=domain,

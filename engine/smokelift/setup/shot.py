@@ -91,8 +91,8 @@ class Shot:
     smoky
         Numbers of the frames, of those examined, that show smoke, those with the most first.
     place
-        Where in depth the smoke was found to stand; None where it is given, or seen by several cameras or one
-        that travels.
+        Where in depth the smoke stands, found or given; None by the paper's method, with several cameras, or with one
+        that travels where no distance is given.
     fire
         The input's view, its clip replaced by the light that fire adds; None without fire.
     """

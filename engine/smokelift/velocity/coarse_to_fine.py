@@ -100,7 +100,7 @@ class CoarseToFine:
             pair = _half(pair)
         if prediction is not None:
             require_same_shape("the prediction", prediction.shape, pair.before.shape)
-        found = _found(pair, prediction, settings) if seen else None
+        found = _velocity_on_grid(pair, prediction, settings) if seen else None
         if found is None:
             found = Velocity.zero(pair.before.shape, pair.voxel_size, pair.closed)
         elif settings.coarsening:
@@ -113,7 +113,7 @@ class CoarseToFine:
         return smooth_velocity(predicted) if self.settings.coarsening else predicted
 
 
-def _found(pair: DensityPair, given: Velocity | None, settings: VelocitySettings) -> Velocity | None:
+def _velocity_on_grid(pair: DensityPair, given: Velocity | None, settings: VelocitySettings) -> Velocity | None:
     """The velocity on the pair's grid; None where there is no structure to follow.
 
     Without a usable prediction it starts from that of a grid half as fine, unless the pair's grid is coarse.
@@ -122,7 +122,7 @@ def _found(pair: DensityPair, given: Velocity | None, settings: VelocitySettings
     prepared, weight = prepare(pair.before, pair.after), motion_weight(shape, pair.inflow)
     start = prediction = _usable_prediction(given, pair, prepared, weight)
     if start is None and default_coarsening((x, y, z)):
-        coarse = _found(_half(pair), None, settings)
+        coarse = _velocity_on_grid(_half(pair), None, settings)
         start = None if coarse is None else refine(coarse, (x, y, z)).displacement(pair.dt)
     u = StaggeredGrid.zero(shape, 1.0, pair.closed) if start is None else start
     effort: Counter[str] = Counter()
