@@ -15,6 +15,7 @@ import sys
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from itertools import starmap
 from pathlib import Path
@@ -165,12 +166,14 @@ def directory_path(value: object) -> Path:
         raise SequenceError(str(error)) from error
 
 
+@cache
 def _software_versions() -> dict[str, str]:
     versions = {"python": platform.python_version()}
     for name in ("smokelift", "numpy", "scipy", "taichi", "av"):
         with suppress(PackageNotFoundError):
             versions[name] = version(name)
-    return versions
+    # from one version to the next the program changes many times
+    return {**versions, "code": checksum(sorted(Path(__file__).parents[1].rglob("*.py")))}
 
 
 @dataclass(frozen=True)
@@ -198,7 +201,7 @@ class Index:
     start_number: int = 1
     """Number in the names of the files of frame 1."""
     versions: dict[str, Any] = field(default_factory=_software_versions)
-    """Of what a result depends on."""
+    """Of what a result depends on, and the checksum of the program's own code."""
 
     @property
     def numbers(self) -> tuple[int, ...]:
@@ -287,6 +290,12 @@ def json_value(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
+def other_program(index: Index) -> str:
+    """Return in words how what computed a run differs from this program, or an empty string."""
+    there, now = ({**found, "python": ""} for found in (index.versions, _software_versions()))  # a patch is none
+    return _difference("versions", there, now)
+
+
 def first_change(before: Index, now: Index) -> str:
     """Return in words the first thing that differs between two runs and has to be the same, or an empty string."""
     pairs = zip(_compared(before), _compared(now), strict=True)
@@ -305,8 +314,6 @@ def _compared(index: Index) -> Iterator[tuple[str, Any]]:
     # checksums distinguish the files, wherever a project was moved to
     yield "scene", _without_folders(index.scene) if index.sources else index.scene
     yield "settings", index.settings
-    # a patch of Python changes no result
-    yield "versions", {name: found for name, found in index.versions.items() if name != "python"}
 
 
 def _without_folders(scene: Any) -> Any:

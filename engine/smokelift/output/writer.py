@@ -37,6 +37,7 @@ from smokelift.output.index import (
     frame_path,
     is_foreign,
     json_value,
+    other_program,
     proxy_path,
 )
 from smokelift.output.vdb import MIN_PROXY_VOXELS, VdbUnavailable, vdb_module, write_proxy, write_vdb
@@ -310,6 +311,11 @@ def _earlier_run(directory: Path, resume: bool) -> Index | None:
             f"{directory}: holds other files ({foreign[0]}); nothing was overwritten, choose an empty directory"
         )
     there = Index.read(directory) if has_index else None
+    if there is not None and resume and (what := other_program(there)):
+        raise SequenceError(
+            f"{directory}: was begun by another version of Smokelift or of a library ({what}), so new frames would not "
+            "fit the finished ones, which stay; go on with that version, or begin anew in another directory"
+        )
     if there is None or resume:
         return there
     if there.frames:

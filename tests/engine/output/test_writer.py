@@ -18,7 +18,7 @@ from smokelift.output import vdb
 from smokelift.output.archive import VELOCITY, ResumeState
 from smokelift.output.export import ExportSettings, export_sequence, write_proxies
 from smokelift.output.index import LOCK, PICTURES, SequenceError
-from smokelift.output.writer import SequenceWriter, count_finished
+from smokelift.output.writer import check_directory, SequenceWriter, count_finished
 from smokelift.transport import face_shapes
 
 COARSER, DARK = {**SETTINGS, "density": {"iterations": 13}}, replace(SCENE, lights=())
@@ -164,14 +164,16 @@ def test_another_run_is_not_resumed(tmp_path, no_vdb, change, words) -> None:
 
 
 def test_another_version_of_what_computes_is_not_resumed(tmp_path, no_vdb) -> None:
-    """A patch of Python computes the same."""
+    """Nor another state of the same version, before anything is computed. A patch of Python computes the same."""
     cut_off(tmp_path, [1])
     index = json.loads((tmp_path / "sequence.json").read_text())
-    for name, resumes in (("numpy", False), ("python", True)):
+    for name, resumes in (("numpy", False), ("code", False), ("python", True)):
         other = {**index, "versions": {**index["versions"], name: "1.0"}}
         (tmp_path / "sequence.json").write_text(json.dumps(other))
-        with nullcontext() if resumes else pytest.raises(SequenceError, match=r"versions\.numpy"):
-            write(tmp_path, [2], resume=True)
+        with nullcontext() if resumes else pytest.raises(SequenceError, match=rf"versions\.{name}"):
+            check_directory(tmp_path, resume=True)
+        assert Sequence.open(tmp_path).frames == (1,)
+    write(tmp_path, [2], resume=True)
 
 
 @pytest.mark.parametrize(
