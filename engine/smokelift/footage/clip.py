@@ -160,8 +160,8 @@ class Clip:
         damaged = self._damaged(self.numbers[0], self.numbers[-1])
         if 2 * len(damaged) > len(self) > 1:
             raise ClipError(
-                f"{self.path}: {len(damaged)} of its {len(self)} frames are missing or cannot be decoded; export "
-                "the clip again, or choose other frames"
+                f"{self.path}: {len(damaged)} of its {len(self)} frames are missing, cannot be decoded, or lack the "
+                "alpha of the others; export the clip again, or choose other frames"
             )
         return tuple(map(self.numbers.index, damaged))
 

@@ -4,6 +4,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -40,6 +41,10 @@ FOCAL_LENGTHS = (4.0, 2000.0)
 
 OPAQUE = 0.999
 """Alpha from which on a pixel is opaque: less than a step of 8 bits below 1."""
+
+MAX_ALPHA_BESIDE = 0.5
+"""Mean alpha below which the picture nearest to opaque ones shows that they lack theirs: smoke does not go from half of
+a picture, or less, to opaque all over it from one frame to the next."""
 
 Edges = npt.NDArray[np.int32]
 Sample = TypeVar("Sample")
@@ -185,14 +190,18 @@ def alpha_background_of(layers: Iterable[Layer]) -> float | None:
     """
     light, opacity, opaque = 0.0, 0.0, True
     for picture, alpha in layers:
-        if alpha is None:
-            break
-        light += float(picture.mean(-1).sum(dtype=np.float64))
-        opacity += float(alpha.sum(dtype=np.float64))
-        opaque = opaque and bool((alpha >= OPAQUE).all())
+        if alpha is not None and mean_alpha(alpha) < 1:
+            light += float(picture.mean(-1).sum(dtype=np.float64))
+            opacity += float(alpha.sum(dtype=np.float64))
+            opaque = False
     if opaque:
         return None
     return 1.0 if opacity > 0 and linear_to_srgb(light / opacity) < 0.5 else 0.0
+
+
+def mean_alpha(alpha: Picture | None) -> float:
+    """Return the mean alpha of a picture; 1 if it is opaque."""
+    return 1.0 if alpha is None or (alpha >= OPAQUE).all() else float(alpha.mean())
 
 
 class ImageSequence(FrameSource):
@@ -216,6 +225,7 @@ class ImageSequence(FrameSource):
         layers = (layer for layer in self._sound_samples(self._stored) if isinstance(layer, tuple))
         linear = (np.dstack((values, alpha)) for values, alpha in layers if alpha is not None)
         self._unlikely = self.alpha_background is not None and may_be_straight(linear)
+        self._mean_alpha = cache(self._read_mean_alpha)
 
     @property
     def notes(self) -> tuple[Finding, ...]:
@@ -225,7 +235,10 @@ class ImageSequence(FrameSource):
         return (*notes, Finding("scaled pictures", {"size": self._size, "scaled": small}))
 
     def read(self, n: int) -> StoredPicture:
-        image = self.shown(self._layer(n))
+        layer = self._layer(n)
+        if self.alpha_background is not None and mean_alpha(layer[1]) == 1 and self._alpha_beside(n) < MAX_ALPHA_BESIDE:
+            raise DamagedFrameError(f"{self.files[n]}: lacks the alpha that the pictures beside it have")
+        image = self.shown(layer)
         width, height = image.size
         self._size = self._size or (width, height)
         if (width, height) != self._size:
@@ -235,6 +248,17 @@ class ImageSequence(FrameSource):
         size = readable_size(width, height)
         alpha = None if image.alpha is None else area_average(image.alpha, *size)
         return StoredPicture(area_average(image.values, *size), alpha=alpha)
+
+    def _alpha_beside(self, n: int) -> float:
+        """The mean alpha of the nearest picture that is not opaque; 1 if all are."""
+        nearest = sorted(range(self.count), key=lambda other: abs(other - n))
+        return next((mean for mean in map(self._mean_alpha, nearest) if mean < 1), 1.0)
+
+    def _read_mean_alpha(self, n: int) -> float:
+        """The mean alpha of a picture; 1 of one that cannot be read."""
+        with suppress(DamagedFrameError):
+            return mean_alpha(self._layer(n)[1])
+        return 1.0
 
     def _stored(self, n: int) -> Codes | Layer:
         try:

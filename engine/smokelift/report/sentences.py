@@ -33,8 +33,8 @@ SENTENCES: Mapping[str, str] = {
         "{path}: is truncated; only {frames:frame} of it can be used. Copy or export it again for the rest."
     ),
     "damaged frames": (
-        "{path}: {frames} missing or damaged (counted from 0); a neighboring good frame stands in, so the smoke "
-        "stands still there. Export the clip again to mend that."
+        "{path}: {frames} missing, damaged, or without the alpha of the others (counted from 0); a neighboring good "
+        "frame stands in, so the smoke stands still there. Export the clip again to mend that."
     ),
     "pictures without a frame rate": (
         "{path}: pictures carry no frame rate; {fps:g} frames per second are assumed. Give the frame rate if it is "

@@ -116,6 +116,23 @@ def test_an_exr_is_premultiplied_in_linear_light_as_its_format_says(tmp_path) ->
         assert clip.findings() == ()
 
 
+@pytest.mark.parametrize("first", [0, 2])
+@pytest.mark.parametrize("channels", ["RGB", "RGBA"])
+def test_pictures_that_lack_the_alpha_of_the_others_are_no_solid_smoke(tmp_path, first, channels) -> None:
+    """Nor is a clip without alpha that begins so. Where alpha grows to all of a picture, it is smoke."""
+    for n in range(8):
+        picture = stored(IN_LIGHT, n, 0.7)
+        if n in (first, first + 1):
+            picture = np.full_like(picture, 1.0)[..., : len(channels)]
+        write_exr(tmp_path / f"a{n}.exr", {channels if n in (first, first + 1) else "RGBA": picture.astype(np.float32)})
+        grown = np.full((HEIGHT, WIDTH, 4), 0.35 * n + 0.2).clip(0, 1)
+        write_exr(tmp_path / f"b{n}.exr", {"RGBA": grown.astype(np.float32)})
+    with Clip.open(tmp_path / "a#.exr", fps=24) as clip, Clip.open(tmp_path / "b#.exr", fps=24) as solid:
+        assert clip.damaged == (first, first + 1)
+        assert clip.alpha(first).mean() < 0.5
+        assert solid.damaged == ()
+
+
 @pytest.mark.parametrize("gray", [0.1, 0.715])
 def test_an_exr_that_can_hardly_be_premultiplied_is_doubted(tmp_path, gray) -> None:
     for n in range(COUNT):

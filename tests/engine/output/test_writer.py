@@ -18,7 +18,7 @@ from smokelift.output import vdb
 from smokelift.output.archive import VELOCITY, ResumeState
 from smokelift.output.export import ExportSettings, export_sequence, write_proxies
 from smokelift.output.index import LOCK, PICTURES, SequenceError
-from smokelift.output.writer import check_directory, SequenceWriter, count_finished
+from smokelift.output.writer import SequenceWriter, check_directory, count_finished
 from smokelift.transport import face_shapes
 
 COARSER, DARK = {**SETTINGS, "density": {"iterations": 13}}, replace(SCENE, lights=())
