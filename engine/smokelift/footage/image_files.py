@@ -85,6 +85,10 @@ MIN_STRAIGHT_RATIO, MIN_VARIATION = 4.0, 0.01
 """Smallest ratio of the own color's variance if premultiplied to that if straight, from which an EXR may be straight:
 ten elements have .1 to 1.2, one that was saved straight 19 (measured). And the least of the latter."""
 
+MAX_STRAIGHT_VARIATION = 0.6
+"""Largest variance of straight colors over all pixels, over the squared mean: shaded smoke has .03 to .5. A flame over
+thin alpha, whose premultiplied color exceeds alpha, has .8 and more, since nothing shines beside it (measured)."""
+
 READABLE = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".dpx", ".exr", ".hdr")
 
 LOG_BYTE, LOG_TRANSFERS = 801, (1, 3)
@@ -149,18 +153,22 @@ def association(pictures: Iterable[npt.NDArray[Any]], decode: Decoder) -> Associ
     """
     kinds: tuple[Association, ...] = get_args(Association)
     # rounding alone makes opaque pictures differ
-    return kinds[int(np.argmin(_variations(pictures, decode).round(6)))]
+    return kinds[int(np.argmin(_variations(pictures, decode)[: len(kinds)].round(6)))]
 
 
 def may_be_straight(pictures: Iterable[npt.NDArray[Any]]) -> bool:
     """Whether linear pictures (rows, columns, rgba), premultiplied by their format, are more likely straight."""
-    straight, premultiplied, _ = _variations(pictures, DECODERS["linear"]) - 1
-    return bool(premultiplied > MIN_STRAIGHT_RATIO * max(straight, MIN_VARIATION))
+    straight, premultiplied, _, evenly = _variations(pictures, DECODERS["linear"]) - 1
+    unlikely = premultiplied > MIN_STRAIGHT_RATIO * max(straight, MIN_VARIATION)
+    return bool(unlikely and evenly < MAX_STRAIGHT_VARIATION)
 
 
 def _variations(pictures: Iterable[npt.NDArray[Any]], decode: Decoder) -> Array:
-    """Mean square of the smoke's own color over the squared mean, by each convention; see `association`."""
-    sums = np.zeros((3, len(get_args(Association))))
+    """Mean square of the smoke's own color over the squared mean, by each convention; see `association`.
+
+    Last is that of what is stored, with the same weight for each pixel, however thin its smoke.
+    """
+    sums = np.zeros((3, 1 + len(get_args(Association))))
     for picture in pictures:
         shown = picture[picture[..., 3] > 0]
         encoded, alpha = shown[:, :3].max(-1), shown[:, 3]
@@ -169,7 +177,8 @@ def _variations(pictures: Iterable[npt.NDArray[Any]], decode: Decoder) -> Array:
             colors = np.stack([linear, linear / alpha, decode(encoded / alpha)], -1).astype(np.float64)
             # errors of premultiplied values are divided by alpha, too
             weights = np.square(alpha, dtype=np.float64)
-            sums += [np.full(3, weights.sum()), weights @ colors, weights @ colors**2]
+            sums[:, :-1] += [np.full(3, weights.sum()), weights @ colors, weights @ colors**2]
+            sums[:, -1] += [len(colors), colors[:, 0].sum(), np.square(colors[:, 0]).sum()]
     total, first, second = sums
     with np.errstate(all="ignore"):
         variations: Array = np.nan_to_num(second * total / first**2, nan=np.inf)

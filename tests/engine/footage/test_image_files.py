@@ -9,7 +9,14 @@ import numpy as np
 import pytest
 
 from smokelift.footage.clip import Clip
-from smokelift.footage.image_files import PRIMARIES, association, hlg_to_linear, pq_to_linear, to_bt709
+from smokelift.footage.image_files import (
+    PRIMARIES,
+    association,
+    hlg_to_linear,
+    may_be_straight,
+    pq_to_linear,
+    to_bt709,
+)
 from smokelift.footage.images import linear_to_srgb, srgb_to_linear
 from tests.engine.films import encode, write_exr
 
@@ -143,3 +150,11 @@ def test_an_exr_that_can_hardly_be_premultiplied_is_doubted(tmp_path, gray) -> N
     for name, said in (("a", ["perhaps straight colors"]), ("b", [])):
         with Clip.open(tmp_path / f"{name}#.exr", fps=24) as clip:
             assert [note.kind for note in clip.findings()] == said
+
+
+def test_a_flame_over_thin_alpha_is_premultiplied() -> None:
+    """Its light exceeds its alpha, as that of straight colors does, but beside it there is none."""
+    alpha, core = opacity(2) ** 2, opacity(0, 1.0) ** 4
+    smoke, fire = 0.4 * alpha * TINT, 3 * core * (alpha > 0) * [1, 0.4, 0.1]
+    assert not may_be_straight([np.concatenate([smoke + fire, alpha], -1)])
+    assert may_be_straight([np.concatenate([0.4 * TINT * (alpha > 0), alpha], -1)])
