@@ -8,13 +8,14 @@ import numpy as np
 
 from smokelift.checks import Finding, require_kind
 from smokelift.extraction.element import Element, clip_element, evenly_lit_element
+from smokelift.extraction.matte import without_fire
 from smokelift.extraction.plate import Plate
 from smokelift.footage.clip import Clip
 from smokelift.footage.frame_source import is_pattern
 from smokelift.footage.images import Picture
 from smokelift.output.images import write_image
 from smokelift.scene import Scene
-from smokelift.setup.first_estimate import burning_smoke, first_findings, is_given
+from smokelift.setup.first_estimate import burning_smoke, first_findings, is_given, sample_smoke
 from smokelift.setup.illumination import source_radiance
 
 PATTERN = "element_####.exr"
@@ -136,7 +137,11 @@ def extract(clip: Clip, scene: Scene) -> Extraction:
     findings = [*clip.findings(), *first_findings(estimate, is_given(scene.background, estimate.found))]
     source, measured = estimate.source, estimate.source is not None or estimate.found.source == "alpha"
     if source is None:
-        source = source_radiance(estimate.samples).astype(np.float32)
+        samples = estimate.samples
+        if estimate.hot.burn:
+            doused = sample_smoke(without_fire(estimate.clip, estimate.plate), estimate.plate)
+            samples = doused if doused.smoky else samples
+        source = source_radiance(samples).astype(np.float32)
         if estimate.samples.smoky and not measured:
             findings.append(Finding("alpha of evenly lit smoke", about="alpha", source="assumed"))
     return Extraction(estimate.clip, estimate.plate, source, measured, tuple(findings))

@@ -38,6 +38,19 @@ def test_what_does_not_show_how_much_passes_gets_a_steady_alpha(tmp_path, plate)
     assert np.ptp(sums) < 0.1, "the thickest smoke of the clip, not of each frame, is opaque"
 
 
+def test_a_flame_lends_no_light_to_the_alpha_of_the_smoke_beside_it(tmp_path) -> None:
+    rows, columns = np.mgrid[:72, :56]
+
+    def burning(n: int, picture: np.ndarray) -> np.ndarray:
+        away = np.hypot(rows - 60 + 5 * np.sin(2.1 * n), columns - 12 - 3 * np.cos(1.7 * n))
+        flame = np.sqrt(np.maximum(1 - away / 6, 0))[..., None] * np.float32((1.5, 0.75, 0.2))
+        return np.minimum(picture + flame, 1)
+
+    with shot(tmp_path, BLACK) as clip:
+        without, beside = (extract(each, Scene()).element(8) for each in (clip, clip.changed(burning)))
+    assert np.abs(beside.transmittance - without.transmittance)[:40].max() < 0.02
+
+
 def test_one_color_of_another_hue_shows_how_much_passes(tmp_path) -> None:
     with shot(tmp_path, GREEN) as clip:
         extraction = extract(clip, Scene())
