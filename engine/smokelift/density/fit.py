@@ -80,9 +80,9 @@ class FittedDensity:
         ``loss`` (sum of squared differences over all cameras' pictures) and ``psnr`` (dB, peak 1) of the input's
         picture as its view has it, in linear radiance, over the pixels that its smoke's voxels can change, all alike;
         ``psnr_view_1``, ... of further views, each absent where its picture shows no smoke; ``relative_error``, the
-        root mean square of the input's differences over that of what changes there, with what its element leaves out as
-        no smoke in both: 1 if nothing is fitted, however faint the smoke; ``iterations``; ``hull_share``, the hull's
-        fraction of the voxels.
+        root mean square of the input's differences over that of what changes there, in all that is fitted, T of an
+        element too, and with what the element leaves out as no smoke: 1 if nothing is fitted, however faint the smoke;
+        ``iterations``; ``hull_share``, the hull's fraction of the voxels.
     smooth_density : (nx, ny, nz) float32, optional
         The density without made-up detail (`Detail.smooth_density`); None if nothing was made up.
     for_advection : (nx, ny, nz) float32, optional
@@ -278,12 +278,18 @@ def fit_figures(views: ViewSet, residuals: Sequence[Image], iterations: int) -> 
             name = f"psnr_view_{number}" if number else "psnr"
             decibels[name] = float(-10 * np.log10(max(losses[-1] / left.size, 1e-12)))
     front = views.views[0]
-    change = float(np.sum(np.square((front.image - front.background)[front.influenced][:, :3], dtype=np.float64)))
-    left_out = float(np.sum(np.square(front.left_out[front.influenced], dtype=np.float64)))
+
+    def power(values: Image) -> float:
+        return float(np.sum(np.square(values[front.influenced], dtype=np.float64)))
+
+    # an assumed light makes the picture wrong, and what is no smoke T, too
+    change, other = front.image - front.background, power(front.left_out)
+    smoke = power(change[..., :3])
+    lost = power(residuals[0]) * (smoke / power(change)) if smoke > 0 else 0.0
     return {
         "loss": sum(losses),
         **decibels,
-        **({"relative_error": math.sqrt((losses[0] + left_out) / (change + left_out))} if change > 0 else {}),
+        **({"relative_error": math.sqrt((lost + other) / (smoke + other))} if smoke > 0 else {}),
         "iterations": float(iterations),
         "hull_share": np.count_nonzero(views.hull) / views.hull.size,
     }

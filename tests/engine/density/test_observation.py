@@ -131,6 +131,15 @@ def test_what_an_element_leaves_out_is_a_fault_of_the_fit(small, wall, element) 
     assert errors[1] > 0.3
 
 
+@pytest.mark.parametrize("brightness", [0.7, 2.0])
+def test_an_assumed_light_that_is_wrong_makes_smoke_nothing_else(small, wall, element, brightness) -> None:
+    """The fit follows T then, and is judged by it: the light's error is no fault of what counts as smoke."""
+    plate, lit = eight_bit_plate(wall, small.camera.size), replace(element, radiance=brightness * element.radiance)
+    observation = Observation(small.camera, lit.over(wall), plate, lit, light_assumed=True)
+    views = ViewSet.of([observation], scene_optics(completed(small)))
+    assert GradientFit(QUICK).fit(views, RoundDepth().estimate(views), None).figures["relative_error"] < 0.3
+
+
 def test_smoke_before_a_wall_is_extracted_and_fitted(plume, small, wall, element) -> None:
     """Nothing but the picture and its plate is given. The result before gray is the smoke before gray."""
     gray, plate = wall.mean((0, 1)), eight_bit_plate(wall, small.camera.size)
