@@ -90,6 +90,7 @@ POOR = "poor"  # the word for a PSNR below these
 UNRATED = (
     *("smoke in the background", "background never seen"),
     *("background never seen beside strokes", "given background never seen"),
+    "smoke in the given frame",
 )
 """Doubts with which smoke may match its clip well and still be wrong: a part of it is in the background."""
 

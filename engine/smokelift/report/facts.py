@@ -159,7 +159,7 @@ def made_up(shot: Shot) -> list[Finding]:
 
 def expected_shortcomings(shot: Shot) -> list[Finding]:
     """Return the doubts about a run that the set-up of its shot gives reason for."""
-    named = {"likely wrong light", "given background never seen"}
+    named = {"likely wrong light", "given background never seen", "smoke in the given frame"}
     if shot.fire is not None or any(found.kind in named for found in shot.findings):
         return []
     figures = next((found.figures for found in shot.findings if found.about == "scattering"), {})

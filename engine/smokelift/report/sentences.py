@@ -123,6 +123,10 @@ SENTENCES: Mapping[str, str] = {
         "{fraction:.0%} of what stands still in the picture is not the background that is given, which may belong to "
         "another clip or take: give one of this clip, or none."
     ),
+    "smoke in the given frame": (
+        "The frame that is given as background may hold smoke itself, or things that move: {fraction:.0%} of the light "
+        "that changes no smoke of one color explains before it. Give a frame without any, or a clean plate."
+    ),
     "smoke everywhere": (
         "Smoke covers {fraction:.0%} of a frame, and every part of the picture at some time. If another color than the "
         "one that was found is behind it, give that as background."

@@ -261,6 +261,16 @@ def test_a_given_background_that_the_clip_never_shows_is_said(tmp_path, smoke, f
     assert kinds(found, sample_smoke(found.clip, found.plate), given=True) == ["given background never seen"] * said
 
 
+@pytest.mark.parametrize("plate", [wall(0.2, 0.5), np.full((72, 56, 3), (0.2, 0.3, 0.5))], ids=["wall", "sky"])
+def test_a_given_frame_that_holds_smoke_is_said(tmp_path, plate) -> None:
+    """What the smoke has left since changes the other way than what it has reached."""
+    with film(tmp_path, plate, lambda n: puff(n) * (n > 0), 0.6) as clip:
+        for frame, said in ((0, False), (12, True)):
+            found = find_background(clip, None, Background(frame=(frame,)))
+            doubted = kinds(found, sample_smoke(found.clip, found.plate), given=True)
+            assert doubted == ["smoke in the given frame"] * said
+
+
 def test_smoke_before_a_wall_that_no_frame_shows_is_undetermined(tmp_path) -> None:
     clip = clip_of(tmp_path, (before_tiles(flickering(n)) for n in range(12)))
     (found,) = background_findings(find_background(clip, None, None))
