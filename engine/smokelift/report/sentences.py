@@ -124,8 +124,9 @@ SENTENCES: Mapping[str, str] = {
         "another clip or take: give one of this clip, or none."
     ),
     "smoke in the given frame": (
-        "The frame that is given as background may hold smoke itself, or things that move: {fraction:.0%} of the light "
-        "that changes no smoke of one color explains before it. Give a frame without any, or a clean plate."
+        "The frame that is given as background may hold smoke itself, or things that move: no smoke of one color "
+        "explains {fraction:.0%} of what changes before it. Give a frame without any or a clean plate, or paint its "
+        "smoke green."
     ),
     "smoke everywhere": (
         "Smoke covers {fraction:.0%} of a frame, and every part of the picture at some time. If another color than the "

@@ -62,8 +62,8 @@ SOURCES, CHECKED_PIXELS = 25, 20_000
 
 MAX_CONTRARY_FRACTION = 0.21
 """Largest part of the light that smoke adds and takes which is no smoke's before a given frame. Nine films before their
-plate have .00 to .07, before 24 frames of themselves .22 to .60. Real clips have .07 to .17 before five clear frames,
-.20 to .48 before five where people moved, .24 to .40 before six with smoke, and .05 and .15 before two with little."""
+plate have .00 to .07, before 24 of their own frames .22 to .60. Real clips have .00 to .17 before seven clear frames,
+.14 to .48 before six where somebody moved, .24 to .46 before nine with smoke; four with smoke are missed (measured)."""
 
 MIN_COARSE_QUANTIZER = 42.0
 """Quantizer from which faint smoke is taken for background, if that has more than one color. Before a brick wall crf
