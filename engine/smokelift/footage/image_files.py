@@ -159,8 +159,7 @@ def association(pictures: Iterable[npt.NDArray[Any]], decode: Decoder) -> Associ
 def may_be_straight(pictures: Iterable[npt.NDArray[Any]]) -> bool:
     """Whether linear pictures (rows, columns, rgba), premultiplied by their format, are more likely straight."""
     straight, premultiplied, _, evenly = _variations(pictures, DECODERS["linear"]) - 1
-    unlikely = premultiplied > MIN_STRAIGHT_RATIO * max(straight, MIN_VARIATION)
-    return bool(unlikely and evenly < MAX_STRAIGHT_VARIATION)
+    return bool(premultiplied > MIN_STRAIGHT_RATIO * max(straight, MIN_VARIATION) and evenly < MAX_STRAIGHT_VARIATION)
 
 
 def _variations(pictures: Iterable[npt.NDArray[Any]], decode: Decoder) -> Array:

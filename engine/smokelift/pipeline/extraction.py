@@ -15,7 +15,7 @@ from smokelift.footage.frame_source import is_pattern
 from smokelift.footage.images import Picture
 from smokelift.output.images import write_image
 from smokelift.scene import Scene
-from smokelift.setup.first_estimate import burning_smoke, first_findings, is_given, sample_smoke
+from smokelift.setup.first_estimate import first_estimate, first_findings, is_given, sample_smoke
 from smokelift.setup.illumination import source_radiance
 
 PATTERN = "element_####.exr"
@@ -133,7 +133,7 @@ def extract(clip: Clip, scene: Scene) -> Extraction:
     """
     require_kind(clip, Clip, "clip", 'a Clip (Clip.open("clip.mp4") opens one)')
     require_kind(scene, Scene, "scene", "a Scene (Scene() leaves all open, Scene.load reads a file)")
-    estimate = burning_smoke(clip, scene.camera, scene.background)
+    estimate = first_estimate(clip, scene.camera, scene.background, by_hue=True, with_fire=True)
     findings = [*clip.findings(), *first_findings(estimate, is_given(scene.background, estimate.found))]
     source, measured = estimate.source, estimate.source is not None or estimate.found.source == "alpha"
     if source is None:

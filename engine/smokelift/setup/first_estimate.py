@@ -167,10 +167,12 @@ def first_estimate(
     medium: Medium | None = None,
     *,
     by_hue: bool = False,
+    with_fire: bool = False,
 ) -> FirstEstimate:
     """Estimate what a clip shows; other parameters and errors as of `find_background` and `with_source`.
 
-    Where the ``medium`` that is given has a color of its flame there is fire, however little of it is certain.
+    Where the ``medium`` that is given has a color of its flame there is fire, however little of it is certain. Its
+    light is taken out, unless the smoke is asked for ``with_fire``.
     """
     flame_color = None if medium is None else medium.flame_color
     found = find_background(clip, camera, background)
@@ -182,7 +184,7 @@ def first_estimate(
         # what shines through smoke and is part of the plate does not burn
         plate, source, samples = with_source(found, clip, samples, by_hue=by_hue)
     burning = hot_pixels(samples.colors, samples.behind)
-    if given or burning.burn:
+    if (given or burning.burn) and not with_fire:
         doused = without_fire(clip, plate)
         light = firelight(clip, doused)
         fire, hot, clip = Fire(light, flame_color or fire_color(clip, light)), burning, doused
@@ -190,18 +192,6 @@ def first_estimate(
     if plate is not found.plate:
         clip = cleared(clip, plate)  # what a mask hides showed the plate as it was, and would be smoke before this one
     return FirstEstimate(clip, found, plate, samples, fire, hot, source)
-
-
-def burning_smoke(clip: Clip, camera: Camera | None, background: Background | None) -> FirstEstimate:
-    """Estimate what a clip shows as `first_estimate` does, but for fire: its light is left in the smoke's.
-
-    One color counts as showing T where its hue is not the smoke's.
-    """
-    found = find_background(clip, camera, background)
-    samples = sample_smoke(found.clip, found.plate)
-    hot = hot_pixels(samples.colors, samples.behind)
-    plate, source, samples = with_source(found, found.clip, samples, by_hue=True)
-    return FirstEstimate(cleared(found.clip, plate), found, plate, samples, None, hot, source)
 
 
 def with_source(
