@@ -101,7 +101,7 @@ nothing: half of that over which opacity has its range (docs/experiments/hidden-
 MAX_CORRECTION = 3.0
 """Difference of a clear moment from what is continued there, in standard deviations, beyond which it is an object's."""
 
-STEP = 2
+FRAME_STRIDE = 2
 """One in so many examined frames is read at full size."""
 
 DETAIL_MARGIN = 16
@@ -343,13 +343,13 @@ def whole_plate(clip: Clip, proxy: Proxy, found: CleanPlate) -> Picture:
     """Return the linear background (rows, columns, 3) ``found`` on a proxy at full size, made of the same frames."""
     if found.image.shape[1::-1] == clip.size:
         return found.image
-    shown = (found.clear & found.known)[::STEP]
+    shown = (found.clear & found.known)[::FRAME_STRIDE]
     known = shown.any(0)
     y, x = (_edges(*sizes) for sizes in zip(known.shape, clip.size[::-1], strict=True))
     file, whole = clip.whole(), np.zeros((*clip.size[::-1], 3), np.float32)
     shown = np.where(known, shown, True)
     times = shown.sum(0, dtype=np.float32)[..., None]
-    for number, gain, clear in zip(proxy.numbers[::STEP], proxy.gains[::STEP], shown, strict=True):
+    for number, gain, clear in zip(proxy.numbers[::FRAME_STRIDE], proxy.gains[::FRAME_STRIDE], shown, strict=True):
         file.stored(number).add_weighted(clear[..., None] / (gain * times), (y, x), whole)
     whole += area_average(found.correction, *clip.size)
     if known.all():

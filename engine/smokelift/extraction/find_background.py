@@ -77,7 +77,7 @@ MOVING_CAMERA = (
 )
 """Message that refuses a clip."""
 
-Source = Literal["alpha", "given", "color", "color around one frame", "black for want of a picture", "picture"]
+BackgroundKind = Literal["alpha", "given", "color", "color around one frame", "black for want of a picture", "picture"]
 
 BLOCKS = 64
 """Blocks along the longer side: means over so many pixels that white noise is gone."""
@@ -129,8 +129,8 @@ stages in the dark (docs/experiments/background.md)."""
 class FoundBackground:
     """What stands behind the smoke of a clip."""
 
-    source: Source
-    """Where it comes from."""
+    kind: BackgroundKind
+    """What it is, and where it comes from."""
     clip: Clip
     """The footage at its plate's exposure, without the light that noise adds, with the plate in place of what a mask
     hides and of what is painted as no smoke."""
@@ -196,7 +196,7 @@ def find_background(clip: Clip, camera: Camera | None, background: Background | 
         # turns find what is behind smoke in the frames that are named, too
         span = (min(*frames, clip.numbers[0]), max(*frames, clip.numbers[-1])) if frames else None
         found = FoundBackground("alpha" if gray else "given", shown, plate, said, uncut_span=span, motion=motion)
-    plate = uncovered(found.plate, found.clip) if found.source == "picture" else found.plate
+    plate = uncovered(found.plate, found.clip) if found.kind == "picture" else found.plate
     found = replace(found, clip=cleared(found.clip, plate), plate=plate)
     if strokes is None:
         return found
@@ -205,10 +205,10 @@ def find_background(clip: Clip, camera: Camera | None, background: Background | 
             "Strokes are painted over one frame, but what is behind the smoke changes from frame to frame. Leave them "
             "out, or stabilize the clip and give one picture as background."
         )
-    one_color = said.estimated and found.source != "picture"
+    one_color = said.estimated and found.kind != "picture"
     # a picture was found with what is painted as smoke; a color or a clean plate is given for what is behind it, but a
     # frame of the clip may hold smoke
-    behind = found.source == "picture" or said.color is not None or said.image is not None
+    behind = found.kind == "picture" or said.color is not None or said.image is not None
     left = replace(strokes, smoke=np.zeros_like(strokes.smoke)) if behind else strokes
     plate, clip = stroked(left, plate, found.clip, one_color)
     return replace(found, clip=clip, plate=plate, background=said, strokes=strokes)
@@ -263,18 +263,18 @@ def _estimated(clip: Clip, moves: bool, smoke: Mask | None, motion: CameraMotion
             raise ValueError(MOVING_CAMERA)
         if shaken is not None:
             return _estimated(filmed.registered(shaken.at), moves, smoke, shaken)
-    source: Source = "color"
+    kind: BackgroundKind = "color"
     if color is None:
         # what a mask hides is no smoke: where it never changes, it is background
-        shown, source = part.with_unchanged(), "picture"
+        shown, kind = part.with_unchanged(), "picture"
         plate = _picture(clip, shown, white, smoke)
         if plate.confidence.mean() < MIN_KNOWN * shown.seen.any(0).mean():
             # fog drifts over all of the file: treat it as filmed before black
-            color, objects, source = np.zeros(3, np.float32), np.zeros_like(objects), "black for want of a picture"
+            color, objects, kind = np.zeros(3, np.float32), np.zeros_like(objects), "black for want of a picture"
     if color is not None:
         plate = _of_one_color(clip, part, color, objects, white)
     span = part.numbers[0], part.numbers[-1]
-    return FoundBackground(source, clip.exposed(plate.gain), plate, None, len(part.numbers), span, cut, motion=motion)
+    return FoundBackground(kind, clip.exposed(plate.gain), plate, None, len(part.numbers), span, cut, motion=motion)
 
 
 def _picture(clip: Clip, proxy: Proxy, white: Picture, smoke: Mask | None) -> Plate:

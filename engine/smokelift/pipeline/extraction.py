@@ -135,7 +135,7 @@ def extract(clip: Clip, scene: Scene) -> Extraction:
     require_kind(scene, Scene, "scene", "a Scene (Scene() leaves all open, Scene.load reads a file)")
     estimate = first_estimate(clip, scene.camera, scene.background, by_hue=True, with_fire=True)
     findings = [*clip.findings(), *first_findings(estimate, is_given(scene.background, estimate.found))]
-    source, measured = estimate.source, estimate.source is not None or estimate.found.source == "alpha"
+    source, measured = estimate.source, estimate.source is not None or estimate.found.kind == "alpha"
     if source is None:
         samples = estimate.samples
         if estimate.hot.burn:

@@ -208,11 +208,11 @@ def with_source(
     """
     if not samples.smoky:
         return found.plate, None, samples
-    if found.source == "alpha":
+    if found.kind == "alpha":
         return found.plate, alpha_source(clip, found.plate, samples.smoky[:SOURCE_FRAMES], SAMPLE_SIDE), samples
     # a wall that was found is no even color, however little its light changes
     shown = visible_plate(found.plate, clip, samples.smoky[0])
-    color = None if found.source == "picture" else single_color(shown)
+    color = None if found.kind == "picture" else single_color(shown)
     if color is not None and not by_hue:
         return found.plate, None, samples
     plate, source = plate_and_source(clip, found.uncut_clip(clip), found.plate, samples.smoky)
@@ -284,12 +284,12 @@ def first_findings(estimate: FirstEstimate, given: bool) -> list[Finding]:
     """Return what was assumed or noticed of a clip and its background, which may be ``given``; with the doubts."""
     found, samples = estimate.found, estimate.samples
     said = background_findings(found, not given and _between_bars(samples))
-    if found.source == "alpha" and given:
+    if found.kind == "alpha" and given:
         said.append(Finding("background unused"))
     said += doubts(found, samples, given)
-    if found.source == "picture" and samples.clearest is not None and samples.unknown.any():
+    if found.kind == "picture" and samples.clearest is not None and samples.unknown.any():
         said.append(Finding("clearest frame", {"frame": found.clip.numbers[samples.clearest]}))
-    if found.source == "alpha" and samples.smoky and estimate.source is None:
+    if found.kind == "alpha" and samples.smoky and estimate.source is None:
         said.append(Finding("alpha is a mask", about="alpha", source="estimated"))
     if samples.exposure:
         said.append(Finding("exposure", {"change": samples.exposure}, about="exposure", source="measured"))
@@ -299,7 +299,7 @@ def first_findings(estimate: FirstEstimate, given: bool) -> list[Finding]:
 def is_given(background: Background | None, found: FoundBackground) -> bool:
     """Whether a scene says what is behind the smoke: an alpha channel leaves only strokes to be given in vain."""
     # with an alpha channel, which leaves no background to estimate, strokes alone count as a given one
-    return background is not None and (not background.estimated or found.source == "alpha")
+    return background is not None and (not background.estimated or found.kind == "alpha")
 
 
 def background_findings(found: FoundBackground, bars: bool = False) -> list[Finding]:
@@ -321,11 +321,11 @@ def _how_found(found: FoundBackground, bars: bool) -> list[Finding]:
     """What is behind the smoke; nothing if it is given."""
     clip, plate = found.clip, found.plate
     background = partial(Finding, about="background", source="estimated")
-    if found.source == "alpha":
+    if found.kind == "alpha":
         return [background("alpha channel", {"behind": "white" if clip.alpha_background else "black"})]
-    if found.source == "given":
+    if found.kind == "given":
         return []
-    if found.source == "picture":
+    if found.kind == "picture":
         unknown = float(unknown_part(plate, clip, 0).mean())
         return [
             background("background partly seen", {"unknown": unknown}) if unknown else background("background seen")
@@ -334,7 +334,7 @@ def _how_found(found: FoundBackground, bars: bool) -> list[Finding]:
     color = np.median(image.reshape(-1, 3), axis=0)
     red, green, blue = map(float, color)
     figures = {"color": (red, green, blue)}
-    if bars or found.source == "black for want of a picture":
+    if bars or found.kind == "black for want of a picture":
         return [background("background assumed", figures, source="assumed")]
     other = float((image != color).any(-1).mean())
     objects = [Finding("background with objects", {"fraction": other})] if other else []
@@ -356,22 +356,22 @@ def doubts(found: FoundBackground, samples: SmokeSamples, given: bool) -> list[F
     elif not samples.smoky:
         painted = found.strokes is not None and bool((found.strokes.other | found.strokes.behind).any())
         said.append(what_helps(clip, given, painted))
-    if found.source == "color around one frame":
+    if found.kind == "color around one frame":
         said.append(doubt("background of one frame"))
-    if found.source == "black for want of a picture":
+    if found.kind == "black for want of a picture":
         green = found.strokes is not None and found.strokes.smoke.any()
         said.append(doubt("background never seen beside strokes" if green else "background never seen"))
     enough = len(samples.over_known) >= MIN_SAME_FRAMES
-    if found.source == "given" and enough and samples.standing > MAJORITY:
+    if found.kind == "given" and enough and samples.standing > MAJORITY:
         said.append(doubt("given background never seen", {"fraction": samples.standing}))
     elif found.background is not None and found.background.frame and samples.contrary > MAX_CONTRARY_FRACTION:
         said.append(doubt("smoke in the given frame", {"fraction": samples.contrary}))
     covered = _covered_at_a_time(samples) / samples.covered.size
-    if found.source == "color" and samples.covered.mean() >= MIN_EVERYWHERE_FRACTION and covered > MAJORITY:
+    if found.kind == "color" and samples.covered.mean() >= MIN_EVERYWHERE_FRACTION and covered > MAJORITY:
         said.append(doubt("smoke everywhere", {"fraction": covered}))
-    if found.source == "picture" and 1 < found.frames < MIN_SAME_FRAMES:
+    if found.kind == "picture" and 1 < found.frames < MIN_SAME_FRAMES:
         said.append(doubt("background of few frames", {"frames": found.frames}))
-    quantizer = median_quantizer(clip.path) if found.source == "picture" else None
+    quantizer = median_quantizer(clip.path) if found.kind == "picture" else None
     if quantizer is not None and quantizer >= MIN_COARSE_QUANTIZER:
         said.append(doubt("strong compression", {"quantizer": quantizer}))
     unknown = samples.unknown

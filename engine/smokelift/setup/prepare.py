@@ -111,7 +111,7 @@ def _source_in_light(estimate: FirstEstimate, scene: CompleteScene) -> Image | N
     lit = scene_optics(scene).unshadowed_source()
     if scene.scattering in SHADOWED:
         lit = SHADOWED_SOURCE * lit
-    if estimate.found.source == "picture" and estimate.samples.exposure:
+    if estimate.found.kind == "picture" and estimate.samples.exposure:
         # a plate from a clip whose white balance changes has that of some frame, and no light's
         lit = lit.mean() * estimate.source / estimate.source.mean()
     return np.asarray(lit, np.float32)

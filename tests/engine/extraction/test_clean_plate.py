@@ -114,7 +114,7 @@ def test_a_wall_that_is_hardly_shaded_tells_its_smoke_by_hue(tmp_path) -> None:
     tone = np.linspace(0.88, 1.12, WIDTH, dtype=np.float32)[:, None]
     truth = np.broadcast_to(tone * np.float32((0.18, 0.32, 0.16)), (HEIGHT, WIDTH, 3))
     estimate = first_estimate(film(tmp_path, truth, puff, 0.4, 0.5), None, None)
-    assert estimate.found.source == "picture"
+    assert estimate.found.kind == "picture"
     assert estimate.source == pytest.approx(np.full(3, 0.4), rel=0.25)
 
 
@@ -213,7 +213,7 @@ def large_wall() -> np.ndarray:
 
 def found_on(clip: Clip) -> Plate:
     background = find_background(clip, None, None)
-    assert background.source == "picture"
+    assert background.kind == "picture"
     return background.plate
 
 

@@ -42,7 +42,7 @@ def fog(folder: Path, frames: tuple[int, int] | None = None, haze: float | None 
 
 
 @pytest.mark.parametrize(
-    ("how", "source"),
+    ("how", "kind"),
     [
         ({}, "color"),
         ({"frames": (24, 35)}, "color"),
@@ -51,13 +51,13 @@ def fog(folder: Path, frames: tuple[int, int] | None = None, haze: float | None 
     ],
     ids=["whole", "middle", "never leaves", "never leaves a haze"],
 )
-def test_fog_that_fills_black_is_no_noise(tmp_path, how, source) -> None:
+def test_fog_that_fills_black_is_no_noise(tmp_path, how, kind) -> None:
     """Most of its light is in the matte, also where no pixel is ever clear."""
     with fog(tmp_path, **how) as clip:
         found = find_background(clip, None, None)
-        assert found.source == source
+        assert found.kind == kind
         plate = found.plate.at(0)
-        if source == "color":
+        if kind == "color":
             assert plate.image.max() == 0
             assert plate.noise.total.max() < 2 / 255
         picture = clip.frame(len(clip) // 2)
@@ -72,7 +72,7 @@ def test_faint_fog_before_one_color_is_no_noise(tmp_path) -> None:
     faint = ((60 + each + random.normal(0, 1, rows.shape)) / 255 for each in fog)
     with clip_of(tmp_path, (srgb_to_linear(each) for each in faint)) as clip:
         found = find_background(clip, None, None)
-    assert found.source == "color"
+    assert found.kind == "color"
     assert found.plate.noise.lasting.max() * 255 < 1.3
 
 

@@ -195,7 +195,7 @@ def test_a_given_plate_is_changed_in_the_strokes_alone(tmp_path) -> None:
     found, mended = painted(clip, (moved, BLUE), image=tmp_path / "plate.exr")
     assert codes_apart(mended.image, GRADIENT)[moved].max() < 2
     np.testing.assert_allclose(mended.image[~moved], plate[~moved], rtol=1e-6)
-    assert found.source == "given" and (mended.confidence == 1).all()
+    assert found.kind == "given" and (mended.confidence == 1).all()
 
 
 def test_the_edge_of_two_strokes_is_none(tmp_path) -> None:

@@ -60,7 +60,7 @@ def test_the_background_of_alpha_is_taken_and_nothing_is_estimated(tmp_path) -> 
             found = find_background(clip, None, given)
             assert found.background == Background(color=(1.0, 1.0, 1.0))
             assert (found.plate.at(2).image == 1).all()
-            assert (found.source, found.strokes) == ("alpha", None)
+            assert (found.kind, found.strokes) == ("alpha", None)
 
 
 # pictures in codes, to the last bit those of the linear picture

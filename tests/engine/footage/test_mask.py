@@ -175,7 +175,7 @@ def test_what_a_tight_mask_hides_is_still_background(tmp_path) -> None:
     write_image(tmp_path / "mask.png", np.repeat(smoky[..., None], 3, 2).astype(np.float32))
     with Clip.open(tmp_path / "frame_###.png", mask=tmp_path / "mask.png") as clip:
         found = find_background(clip, None, None)
-    assert found.source == "picture"
+    assert found.kind == "picture"
     plate = found.plate.at(0)
     assert plate.confidence.mean() > 0.5
     assert np.percentile(codes_apart(plate.image, truth)[~smoky], 95) < 5

@@ -341,7 +341,7 @@ def test_a_picture_that_is_taken_for_smoke_is_said(gray, rows, missing, at_a_tim
     frames = dict.fromkeys(range(2), 0)
     nowhere = np.zeros_like(covered)
     samples = replace(SEEN, covered=covered, unknown=nowhere, colors=seen, behind=seen, over_known=frames)
-    assert kinds(replace(gray, source="color"), samples) == said
+    assert kinds(replace(gray, kind="color"), samples) == said
 
 
 @pytest.mark.parametrize("bars", [True, False], ids=["bars", "bars cropped off"])
