@@ -22,6 +22,13 @@ from smokelift.footage.images import Picture, blurred, brightest_channel, channe
 from smokelift.footage.noise import median_of_seen
 from smokelift.footage.registration import IDENTITY, Similarity, corners
 
+MOVING_CAMERA = (
+    "The camera moves, so what is behind the smoke cannot be found from the clip. Stabilize the clip (Blender's Movie "
+    "Clip Editor does), or track it and give a clean plate with a picture for every frame (a video or plate_####.png) "
+    "as background. If the camera stood still, give one clean plate, or a color."
+)
+"""Message that refuses a clip."""
+
 Complex = npt.NDArray[np.complex128]
 """Points and shifts of the picture plane, columns + i rows."""
 
@@ -284,8 +291,8 @@ class CameraMotion:
         return max(width, height) * max(motion.reach(width, height) for motion in self.measured.values())
 
 
-def find_motion(proxy: Proxy) -> CameraMotion | Literal["other"] | None:
-    """Return how the camera moves in a proxy's frames: None if it stands still, "other" if as no similarity does."""
+def find_motion(proxy: Proxy) -> CameraMotion | None:
+    """Return how the camera moves in a proxy's frames, None if it stands still; ValueError if as no similarity does."""
     count = len(proxy.numbers)
     texture = Texture(proxy.pictures[count // 2])
     some = np.unique(np.linspace(0, count - 1, min(count, JUDGED)).round().astype(int))
@@ -294,18 +301,24 @@ def find_motion(proxy: Proxy) -> CameraMotion | Literal["other"] | None:
         return None
     found = _registered_to_median(proxy, [match(n) for n in range(count)])
     if found is None and (brightest_channel(proxy.encoded) <= BLACK).mean() < MIN_BLACK:
-        return "other"
+        raise ValueError(MOVING_CAMERA)
     return found
 
 
-def motion_before(plate: Texture, proxy: Proxy) -> CameraMotion | Literal["other"] | None:
-    """Return how the frames of a proxy lie on a given plate: None if in its place; else as of `find_motion`."""
+def motion_before(plate: Texture, proxy: Proxy) -> CameraMotion | None:
+    """Return how the frames of a proxy lie on a given plate, None if in its place; ValueError if as no similarity."""
     matches = [plate.match(picture) for picture in proxy.pictures]
     if not _some_move(matches):
         return None
     measured = _measured(proxy, matches)
     known = sum(match.camera != "unknown" for match in matches)
-    return CameraMotion(plate, measured, None) if measured and len(measured) >= MIN_REGISTERED * known else "other"
+    if not measured or len(measured) < MIN_REGISTERED * known:
+        raise ValueError(
+            "The clean plate does not lie on the clip: what both show is in other places, and no shift, rotation or "
+            "zoom mends that. Give a plate that the clip's camera filmed from the same place, or frames of the clip "
+            "without smoke."
+        )
+    return CameraMotion(plate, measured, None)
 
 
 def _some_move(matches: Sequence[Match]) -> bool:

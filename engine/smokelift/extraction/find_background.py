@@ -21,7 +21,7 @@ from typing import Literal
 import numpy as np
 
 from smokelift.checks import Mask
-from smokelift.extraction.camera_motion import CameraMotion, Texture, find_motion, motion_before
+from smokelift.extraction.camera_motion import MOVING_CAMERA, CameraMotion, Texture, find_motion, motion_before
 from smokelift.extraction.clean_plate import CleanPlate, clean_plate, spread_out, whole_plate
 from smokelift.extraction.given_background import (
     PAINTED,
@@ -69,13 +69,6 @@ have .2 and more, two walls before a moving camera .05 and .12 (docs/experiments
 
 TEXTURE = np.float32(6 / 255)
 """White noise, in sRGB values, above which it is texture that a moving camera sees."""
-
-MOVING_CAMERA = (
-    "The camera moves, so what is behind the smoke cannot be found from the clip. Stabilize the clip (Blender's Movie "
-    "Clip Editor does), or track it and give a clean plate with a picture for every frame (a video or plate_####.png) "
-    "as background. If the camera stood still, give one clean plate, or a color."
-)
-"""Message that refuses a clip."""
 
 BackgroundKind = Literal["alpha", "given", "color", "color around one frame", "black for want of a picture", "picture"]
 
@@ -220,12 +213,6 @@ def _on_plate(clip: Clip, plate: Picture | Clip | None) -> tuple[Clip, CameraMot
         return clip, None
     texture = Texture(area_average(plate, *reduced_size(*clip.size, PROXY_SIDE)))
     motion = motion_before(texture, Proxy.of(clip, beyond=False)) if texture.enough else None
-    if motion == "other":
-        raise ValueError(
-            "The clean plate does not lie on the clip: what both show is in other places, and no shift, rotation or "
-            "zoom mends that. Give a plate that the clip's camera filmed from the same place, or frames of the clip "
-            "without smoke."
-        )
     return (clip, None) if motion is None else (clip.registered(motion.at), motion)
 
 
@@ -259,8 +246,6 @@ def _estimated(clip: Clip, moves: bool, smoke: Mask | None, motion: CameraMotion
     plain = color is not None and (often or not color.any())
     if not plain and motion is None:
         shaken = find_motion(proxy.with_own(part))
-        if shaken == "other":
-            raise ValueError(MOVING_CAMERA)
         if shaken is not None:
             return _estimated(filmed.registered(shaken.at), moves, smoke, shaken)
     kind: BackgroundKind = "color"

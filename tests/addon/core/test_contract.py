@@ -19,7 +19,7 @@ from smokelift.app.commands import directed
 from smokelift.checks import Source
 from smokelift.direct import state
 from smokelift.direct.retiming import playback
-from smokelift.extraction.find_background import MOVING_CAMERA
+from smokelift.extraction.camera_motion import MOVING_CAMERA
 from smokelift.footage.frame_source import ClipError, numbered_files
 from smokelift.footage.image_files import READABLE
 from smokelift.output.export import ASSET, NOTE
