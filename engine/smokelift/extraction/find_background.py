@@ -1,11 +1,11 @@
 """What stands behind the smoke of a clip, and how it is decided.
 
 The first of these that applies: what an alpha channel says; what the scene gives, a color as it goes on beside the mask
-(`given_background`); one color, if the whole file makes it the likeliest; the picture that the clear frames show
-(`clean_plate`); black, if they show next to nothing. If the camera moves before a picture, the frames are registered
-(`camera_motion`), or the clip is refused; one color is the same wherever it points. The clip's noise is measured first,
-on what cannot be smoke (`noise`). Strokes of the scene change what was found (`stroked`); an alpha channel leaves
-nothing for them to say.
+(`given_background`); the color around the smoke, of a single picture; one color, if the whole file makes it the
+likeliest; the picture that the clear frames show (`clean_plate`); black, if they show next to nothing. If the camera
+moves before a picture, the frames are registered (`camera_motion`), or the clip is refused; one color is the same
+wherever it points. Noise is measured on what cannot be smoke (`noise`). Strokes of the scene change what was found
+(`stroked`); an alpha channel leaves nothing for them to say.
 
 The likeliest of one color and a picture: a block of the picture is clear, and shows its background within the noise, or
 it is smoke, and shows anything. Smoke goes on as it was, or jumps to any value. The cost of a background is the
@@ -155,8 +155,8 @@ def find_background(clip: Clip, camera: Camera | None, background: Background | 
     than a similarity of the picture mends, and the background is neither given for every frame nor of one color, or
     strokes are given.
     """
-    gray = None if clip.alpha_background is None else Background(color=(clip.alpha_background,) * 3)
-    said, moves = gray or background or Background(), camera is not None and camera.moves
+    of_alpha = None if clip.alpha_background is None else Background(color=(clip.alpha_background,) * 3)
+    said, moves = of_alpha or background or Background(), camera is not None and camera.moves
     frames = said.frame
     if moves and frames:
         raise ValueError(MOVING_CAMERA)
@@ -167,7 +167,7 @@ def find_background(clip: Clip, camera: Camera | None, background: Background | 
         found = _estimated(clip, moves, None if strokes is None else strokes.smoke)
     else:
         filmed = bool(frames)
-        if said.color is not None and gray is None and clip.mask is not None and not moves:
+        if said.color is not None and of_alpha is None and clip.mask is not None and not moves:
             continued = continued_color(np.array(said.color, np.float32), clip)
             if continued is not None:
                 given, filmed = continued, True
@@ -176,9 +176,9 @@ def find_background(clip: Clip, camera: Camera | None, background: Background | 
             return known_plate(mean_of_frames(frames, clip) if frames else given, clip, filmed=filmed)
 
         plate, shown = known(clip)
-        if gray is not None:  # no camera filmed the color that alpha leaves open
+        if of_alpha is not None:  # no camera filmed the color that alpha leaves open
             plate, shown = replace(plate, image=np.full_like(plate.image, clip.alpha_background)), clip
-        quiet = clip if gray is not None else without_noise_light(clip, plate.noise)
+        quiet = clip if of_alpha is not None else without_noise_light(clip, plate.noise)
         if quiet is not clip:
             # the noise stays that of the filmed pictures: in the others, mean sRGB values are too low
             noise, (plate, shown) = plate.noise, known(quiet)
@@ -188,7 +188,7 @@ def find_background(clip: Clip, camera: Camera | None, background: Background | 
             plate = replace(plate, finest=finest_detail(clip))
         # turns find what is behind smoke in the frames that are named, too
         span = (min(*frames, clip.numbers[0]), max(*frames, clip.numbers[-1])) if frames else None
-        found = FoundBackground("alpha" if gray else "given", shown, plate, said, uncut_span=span, motion=motion)
+        found = FoundBackground("alpha" if of_alpha else "given", shown, plate, said, uncut_span=span, motion=motion)
     plate = uncovered(found.plate, found.clip) if found.kind == "picture" else found.plate
     found = replace(found, clip=cleared(found.clip, plate), plate=plate)
     if strokes is None:

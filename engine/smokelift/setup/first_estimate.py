@@ -147,8 +147,8 @@ class FirstEstimate:
     """What a clip shows: its background, its smoke, and its fire if any burns.
 
     ``plate`` is ``found.plate``, refined where smoke hides it; ``clip`` is ``found.clip`` without fire. ``hot`` are the
-    pixels that are fire, or may be. ``source`` (3,) is the usual source radiance of the smoke before a picture; None
-    before one that does not show its transmittance (`with_source`), and without smoke.
+    pixels that are fire, or may be. ``source`` (3,) is the usual source radiance of the smoke; None where the
+    clip does not show its transmittance (`with_source`), and without smoke.
     """
 
     clip: Clip
