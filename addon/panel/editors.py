@@ -72,6 +72,13 @@ def show_clip(clip: bpy.types.MovieClip, mask: bpy.types.Mask | None = None) -> 
     open_tab(area)
 
 
+def look_through_camera(area_pointer: int) -> None:
+    """Look through the scene's camera in a 3D View, if it is still there."""
+    for _, area in _windows_and_areas():
+        if area.as_pointer() == area_pointer and area.type == "VIEW_3D":
+            area.spaces.active.region_3d.view_perspective = "CAMERA"
+
+
 def _windows_and_areas() -> list[tuple[bpy.types.Window, bpy.types.Area]]:
     return [(window, area) for window in bpy.context.window_manager.windows for area in window.screen.areas]
 

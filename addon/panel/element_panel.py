@@ -15,10 +15,11 @@ from ..result.side_job import write_files
 from ..scene.blender import rpt_
 from ..scene.clip import lay_below, number_in_file, saved_strokes, shown_frame, strokes_at
 from ..scene.pictures import write_pictures
+from ..scene.plate import camera_of_view, element_behind, show_element_behind
 from ..scene.scene_file import footage_tables
-from ..scene.smoke import active_smoke
+from ..scene.smoke import active_smoke, scene_of
 from .common import FOLDER, UNDO, OpensBrowser, needs_clip, needs_rest, operator, panels
-from .editors import show_image
+from .editors import look_through_camera, show_image
 from .layout import draw_text, draw_work
 from .settings import choice
 
@@ -98,8 +99,12 @@ def _extract_request(smoke: bpy.types.Object, folder: Path) -> list[str]:
 
 
 @operator("Extract", needs_rest, needs_clip)
-def extract(_context: bpy.types.Context, smoke: bpy.types.Object) -> None:
-    """Show the smoke of this frame by itself, with alpha, as Render Element would write it"""
+def extract(context: bpy.types.Context, smoke: bpy.types.Object) -> None:
+    """Show the smoke of this frame by itself, with alpha, as Render Element would write it.
+
+    It lies over the background of the view through the scene's camera; without one, it opens in an Image Editor
+    """
+    area = 0 if context.area is None else context.area.as_pointer()
     folder, frame = smoke_takes.output_folder(smoke) / "element", shown_frame(smoke)
     number = number_in_file(smoke.smokelift.clip, frame)
     picture = folder / PICTURES.replace("####", f"{number:04d}")
@@ -107,7 +112,12 @@ def extract(_context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     def show(_smoke: bpy.types.Object) -> str:
         image = bpy.data.images.load(str(picture), check_existing=True)
         image.reload()
-        show_image(image)
+        camera = camera_of_view(scene_of(smoke))
+        if camera is None:
+            show_image(image)
+        else:
+            show_element_behind(camera, image)
+            look_through_camera(area)
         return rpt_("Frame {:d} of the clip is in {:s}.").format(frame, str(picture))
 
     words = [*_extract_request(smoke, folder), "--frames", f"{number}:{number}"]
@@ -128,4 +138,7 @@ def _draw_element(layout: bpy.types.UILayout, context: bpy.types.Context, smoke:
     row.template_ID(smoke.smokelift, "strokes", open="image.open", text="Strokes")
     row.operator("smokelift.paint_strokes", text="", icon="BRUSH_DATA")
     draw_work(layout, smoke, "smokelift.extract", "IMAGE_RGB_ALPHA")
+    camera = camera_of_view(context.scene)
+    if camera is not None and (element := element_behind(camera)) is not None:
+        layout.prop(element, "show_background_image", text="Element in View")
     draw_work(layout, smoke, "smokelift.render_element", "RENDER_ANIMATION")

@@ -7,7 +7,7 @@ from ..result.shot_check import found_lines, state
 from ..scene import look, shot_setup, volume
 from ..scene.blender import rpt_
 from ..scene.modifiers import CAN_INTERPOLATE, PROXY, in_viewport
-from ..scene.plate import clip_behind
+from ..scene.plate import camera_of_view, clip_behind
 from ..scene.smoke import is_override, smoke_with_look
 from .common import UNDO, Need, needs_clip, needs_result, operator, panels
 from .layout import draw_automatic, draw_settings, draw_text, draw_work
@@ -169,8 +169,7 @@ def _draw_set_up(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: 
     row.use_property_split = True
     row.active = settings.set_up_plate
     row.prop(settings, "plate_place")
-    camera = context.scene.camera
-    clip = clip_behind(smoke, camera.data) if camera is not None and camera.type == "CAMERA" else None
-    if clip is not None:
+    camera = camera_of_view(context.scene)
+    if camera is not None and (clip := clip_behind(smoke, camera)) is not None:
         layout.prop(clip, "show_background_image", text="Clip in View", icon="NONE")
     layout.operator("smokelift.set_up", icon="CAMERA_DATA")

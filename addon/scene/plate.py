@@ -19,6 +19,7 @@ from .smoke import scene_of
 from .volume import frames_before, shown, shown_take
 
 PICTURE_MARK = "smokelift_plate"  # custom property of pictures that a camera's view shows behind smoke
+ELEMENT_MARK = "smokelift_element"  # the same of elements that it shows over those
 BACKGROUND = "Smokelift Background"  # name of a picture of one color
 
 MATERIAL = "Smokelift Projection"  # name of the material, and of the node group in it
@@ -101,6 +102,24 @@ def show_clip_behind(smoke: bpy.types.Object, camera: bpy.types.Camera, visible:
     if clip_behind(smoke, camera) is None:
         _new_picture(camera, "MOVIE_CLIP").clip = smoke.smokelift.clip
     clip_behind(smoke, camera).show_background_image = visible
+
+
+def camera_of_view(scene: bpy.types.Scene) -> bpy.types.Camera | None:
+    """The scene's camera; None if another object stands in for one, which has no pictures behind its view."""
+    return scene.camera.data if scene.camera is not None and scene.camera.type == "CAMERA" else None
+
+
+def show_element_behind(camera: bpy.types.Camera, element: bpy.types.Image) -> None:
+    """Lay the element of a frame over all else that the view through a camera shows behind its objects."""
+    if (before := element_behind(camera)) is not None:
+        camera.background_images.remove(before)  # a plate that was added later would be above
+    element[ELEMENT_MARK] = camera.show_background_images = True
+    _new_picture(camera, "IMAGE").image = element
+
+
+def element_behind(camera: bpy.types.Camera) -> bpy.types.CameraBackgroundImage | None:
+    """The element in the view through a camera, shown or hidden; None without one."""
+    return next((each for each in camera.background_images if each.image and each.image.get(ELEMENT_MARK)), None)
 
 
 def clip_behind(smoke: bpy.types.Object, camera: bpy.types.Camera) -> bpy.types.CameraBackgroundImage | None:

@@ -12,6 +12,7 @@ import bpy
 import pytest
 
 from addon.result import side_job
+from addon.scene.plate import show_clip_behind
 from conftest import save_image
 from tests.addon.inside.panel.tab import said
 from tests.example_shot import smoke
@@ -65,6 +66,22 @@ def test_extract_shows_the_element_of_this_frame(shot, asked, tmp_path) -> None:
     assert side_job.writing_job.doubts == [("", "The plate is noisy.")]
     assert bpy.ops.smokelift.extract() == {"FINISHED"}
     assert [image.name for image in bpy.data.images if "element" in image.name] == [picture.name]
+
+
+def test_the_element_lies_over_what_the_view_shows_behind(shot, asked) -> None:
+    """A second one takes the place of the first; the plate that is set up later lies over it."""
+    camera = shot.camera.data
+    show_clip_behind(smoke(shot), camera)
+    for frame in (24, 25):
+        shot.frame_set(frame)
+        assert bpy.ops.smokelift.extract() == {"FINISHED"}
+    clip, element = camera.background_images
+    assert (clip.source, element.source, element.display_depth) == ("MOVIE_CLIP", "IMAGE", "BACK")
+    assert element.image.name == "element_0024.exr" and element.show_background_image
+    assert "Element in View" in said(shot, bpy.types.SMOKELIFT_PT_view_element)
+    shot.camera = None
+    assert bpy.ops.smokelift.extract() == {"FINISHED"}
+    assert "Element in View" not in said(shot, bpy.types.SMOKELIFT_PT_view_element)
 
 
 def test_render_element_writes_all_frames_that_are_used(settings, asked, tmp_path) -> None:
