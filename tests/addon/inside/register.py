@@ -82,10 +82,10 @@ def test_smoke_is_in_the_menu_for_volumes(scene, tmp_path) -> None:
     assert bpy.ops.smokelift.add(filepath=str(EXAMPLE / "clip.mp4")) == {"FINISHED"}
     assert smoke(scene).smokelift.clip.name == "clip.mp4"
     assert bpy.context.view_layer.objects.active == smoke(scene)
-    with pytest.raises(RuntimeError, match=r"nothing\.mp4 is no video"):
+    with pytest.raises(RuntimeError, match=r"nothing\.mp4"):
         bpy.ops.smokelift.add(filepath=str(tmp_path / "nothing.mp4"))
     (tmp_path / "notes.txt").write_text("no clip")
-    with pytest.raises(RuntimeError, match="no video and no picture"):
+    with pytest.raises(RuntimeError, match=r"notes\.txt"):
         bpy.ops.smokelift.add(filepath=str(tmp_path / "notes.txt"))
     assert len(bpy.data.movieclips) == 1
 

@@ -150,7 +150,7 @@ def test_a_distance_is_measured_level_and_straight_ahead() -> None:
         camera = Camera.look_at((0, -7, height), (0, 0, 1.5), fov_y_degrees=30, size=(75, 113))
         assert depth_at(7.2, camera, BOX) == pytest.approx(0.2)
     for distance in (6.0, 8.2):
-        with pytest.raises(ValueError, match=rf"distance {distance:g} m .* 6 to 8 m"):
+        with pytest.raises(ValueError, match=rf"{distance:g} m .* 6 to 8 m"):
             depth_at(distance, FRONT, BOX)
 
 

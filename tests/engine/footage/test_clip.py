@@ -160,7 +160,7 @@ def test_a_dash_is_no_minus_sign_where_no_picture_has_the_number_0(tmp_path) -> 
     for name in ("shot-###.png", "shot-001.png"):
         assert codes(Clip.open(tmp_path / name)) == [50, 100]
     for number in (3, 4):
-        with pytest.raises(ClipError, match=r"shot-002\.png: .* dash .* give shot-###\.png"):
+        with pytest.raises(ClipError, match=r"shot-002\.png.* shot-###\.png"):
             Clip.open(tmp_path / "shot####.png")
         write(tmp_path, "shot{:04d}.png", {number: 9})
     assert codes(Clip.open(tmp_path / "shot0003.png")) == [9, 9]

@@ -91,24 +91,24 @@ def test_a_shorter_sequence_of_masks_shortens_what_is_looked_at(tmp_path) -> Non
 
 
 @pytest.mark.parametrize(
-    ("values", "said"),
+    ("values", "named"),
     [
-        ({}, r"mask\.png: no such file"),
-        ({"mask.png": np.zeros((4, 4))}, r"mask\.png: .* too little"),
-        ({"mask.png": np.where(np.arange(WIDTH) == SIDE, 255, 0) * np.ones((HEIGHT, 1))}, r"mask\.png: .* too little"),
-        ({"mask.png": None}, r"mask\.png: cannot be read"),
-        ({"mask.png": np.full((HEIGHT, 2 * WIDTH), 255)}, "another shape"),
-        ({f"mask_{n:02d}.png": np.full((4, 4), 255) for n in range(COUNT) if n != 3}, r"mask_03.* is missing"),
+        ({}, "mask.png"),
+        ({"mask.png": np.zeros((4, 4))}, "mask.png"),
+        ({"mask.png": np.where(np.arange(WIDTH) == SIDE, 255, 0) * np.ones((HEIGHT, 1))}, "mask.png"),
+        ({"mask.png": None}, "mask.png"),
+        ({"mask.png": np.full((HEIGHT, 2 * WIDTH), 255)}, f"{2 * WIDTH} x {HEIGHT}"),
+        ({f"mask_{n:02d}.png": np.full((4, 4), 255) for n in range(COUNT) if n != 3}, "mask_03.png"),
     ],
 )
-def test_a_wrong_mask_is_refused(tmp_path, values, said) -> None:
+def test_a_wrong_mask_is_refused(tmp_path, values, named) -> None:
     for name, value in values.items():
         if value is None:
             (tmp_path / name).write_text("no picture")
         else:
             painted(tmp_path / name, value)
     mask = tmp_path / ("mask_##.png" if len(values) > 1 else "mask.png")
-    with pytest.raises((ClipError, ImageError), match=said):
+    with pytest.raises((ClipError, ImageError), match=named):
         Clip.open(filmed(tmp_path / "clip"), mask=mask)
 
 

@@ -74,14 +74,14 @@ def test_a_16_bit_png_with_a_pattern_for_a_name(tmp_path) -> None:
 @pytest.mark.parametrize("size", [(100_000, 100_000), (30_000, 30_000), (2**31 - 1, 1)])
 def test_a_picture_that_says_it_is_huge_is_not_believed(tmp_path, depth, size) -> None:
     (tmp_path / "plate.png").write_bytes(png(*size, depth))
-    with pytest.raises(ImageError, match="cannot be read"):
+    with pytest.raises(ImageError):
         read_image(tmp_path / "plate.png")
 
 
 @pytest.mark.parametrize("name", ["clip.mp4", "frame_0001.png", "plate.hdr"])
 def test_a_pipe_is_not_waited_for(tmp_path, name) -> None:
     os.mkfifo(tmp_path / name)
-    with pytest.raises(ValueError, match=r"is a pipe or a device|no such file"):
+    with pytest.raises(ValueError, match=name):
         Clip.open(tmp_path / name)
 
 
@@ -91,14 +91,10 @@ def test_the_quantizer_is_that_of_the_encoder(tmp_path, quantizer) -> None:
     assert median_quantizer(path) == pytest.approx(quantizer, abs=3)
 
 
-@pytest.mark.parametrize(("name", "codec"), [("a.mp4", "mpeg4"), ("a.mkv", "ffv1"), ("a.webm", "libvpx-vp9")])
-def test_other_codecs_tell_nothing(tmp_path, name, codec) -> None:
-    assert median_quantizer(coded(tmp_path / name, wall(0.2, 0.5), 0.6, codec)) is None
-
-
-def test_pictures_and_files_that_are_no_video_tell_nothing(tmp_path) -> None:
-    clip = film(tmp_path, wall(0.2, 0.5), puff, 0.6)
-    text = tmp_path / "a.mp4"
+def test_other_codecs_pictures_and_files_that_are_no_video_tell_nothing(tmp_path) -> None:
+    kinds = (("b.mp4", "mpeg4"), ("b.mkv", "ffv1"), ("b.webm", "libvpx-vp9"))
+    videos = [coded(tmp_path / name, wall(0.2, 0.5), 0.6, codec) for name, codec in kinds]
+    clip, text = film(tmp_path, wall(0.2, 0.5), puff, 0.6), tmp_path / "a.mp4"
     text.write_text("no video")
-    for path in (clip.path, *clip.files[:1], text, tmp_path, tmp_path / "absent.mp4"):
+    for path in (*videos, clip.path, *clip.files[:1], text, tmp_path, tmp_path / "absent.mp4"):
         assert median_quantizer(path) is None

@@ -77,7 +77,7 @@ def test_the_suggestion_fits(free, size) -> None:
     x, y, z = (n / 100 for n in size)
     assert Domain((0, 0, 0), (x, y, z), smaller).voxel_size > 0.01, "voxels of a calibrated domain stay cubes"
     free(0.2)
-    with pytest.raises(cost.NotEnoughMemoryError, match="no grid"):
+    with pytest.raises(cost.NotEnoughMemoryError):
         cost.require_memory(size, WORK)
 
 

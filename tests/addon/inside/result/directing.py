@@ -100,12 +100,12 @@ def test_frames_are_those_of_the_clip(shot, result) -> None:
     assert settings.start == 45
     settings.start = 44
     assert directing.engine_request(result)[1][-2:] == ["--start", "5"]
-    for frame, said in ((41, "4 frames are needed"), (46, "from 40 to 45")):
+    for frame, said in ((41, "4 frames"), (46, "40 to 45")):
         settings.start = frame
         with pytest.raises(ShotError, match=said):
             directing.engine_request(result)
     settings.fade = 11
-    with pytest.raises(ShotError, match="fades in 11"):
+    with pytest.raises(ShotError, match="11"):
         directing.engine_request(result)
 
 
@@ -152,7 +152,7 @@ def test_meshes_that_move(shot, result, acting, tmp_path) -> None:
     assert "Frames 7 to 11 are a simulation" in result.data[volume.PROVENANCE]
     build = obj.modifiers.new("Build", "BUILD")
     build.frame_start, build.frame_duration = last, 10
-    with pytest.raises(ShotError, match="number of triangles"):
+    with pytest.raises(ShotError, match="frame 13"):
         directing.engine_request(result)
 
 
@@ -190,7 +190,7 @@ def test_winds_and_fans(result, acting) -> None:
     ]
     np.testing.assert_allclose(sorted(words(options, "--fan")), wanted, atol=1e-5)
     placed(acting, "Swirl", field="VORTEX")
-    with pytest.raises(ShotError, match="field of Swirl cannot be used"):
+    with pytest.raises(ShotError, match="Swirl"):
         directing.engine_request(result)
 
 
@@ -202,7 +202,7 @@ def test_turbulence(result, acting) -> None:
     bpy.context.view_layer.update()
     np.testing.assert_allclose(words(directing.engine_request(result)[1], "--turbulence"), [[0.2, 0.5, 7.0]], atol=1e-5)
     field.use_max_distance = True
-    with pytest.raises(ShotError, match="Max Distance of Stir"):
+    with pytest.raises(ShotError, match="Stir"):
         directing.engine_request(result)
 
 

@@ -35,14 +35,14 @@ def test_frames_without_smoke_are_the_plate(shot, settings, tmp_path) -> None:
 
 def test_frames_that_the_clip_does_not_have_are_refused(shot, settings) -> None:
     settings.plate_mode = "FRAMES"
-    for text, said in (("", "press Plate from This Frame"), ("0", "has frames 1 to"), ("2, x", "Frames 2, x are not")):
+    for text, said in (("", "Plate from This Frame"), ("0", "1 to 48"), ("2, x", "2, x")):
         settings.plate_frames = text
         with pytest.raises(ShotError, match=said):
             footage_tables(smoke(shot))
     settings.clip.frame_start = 11
     shot.frame_set(10)
     for operator in (bpy.ops.smokelift.plate_from_frame, bpy.ops.smokelift.extract):
-        with pytest.raises(RuntimeError, match="not seen in frame 10: go to one from 11 to 58"):
+        with pytest.raises(RuntimeError, match=r"frame 10\b.* 11 to 58"):
             operator()
     settings.clip = bpy.data.movieclips.load(str(EXAMPLE / "clip.mp4"))
     assert settings.plate_frames == ""
@@ -165,7 +165,7 @@ def test_a_stroke_of_another_color_is_left_for_the_engine_to_refuse(shot, settin
         paint(settings.strokes, color, 1.0, rows)
     file = footage_tables(smoke(shot))["background"]["strokes"]
     assert (pixels(Path(file))[:4] == (1.0, 1.0, 0.0, 1.0)).all()
-    with pytest.raises(ValueError, match="some strokes are neither"):
+    with pytest.raises(ValueError, match=r"strokes\.png"):
         Strokes.read(Path(file), tuple(settings.clip.size))
 
 
@@ -174,11 +174,11 @@ def test_strokes_that_cannot_be_written_are_named(shot, tmp_path) -> None:
     bpy.ops.smokelift.paint_strokes()
     (tmp_path / "file").touch()
     smoke(shot).smokelift.strokes.filepath_raw = str(tmp_path / "file" / "strokes.png")
-    with pytest.raises(ShotError, match=r"strokes\.png cannot be written"):
+    with pytest.raises(ShotError, match=r"strokes\.png"):
         footage_tables(smoke(shot))
 
 
-@pytest.mark.parametrize(("size", "saved", "said"), [((8, 8), True, "8 x 8 pixels"), ((256, 384), False, "in no file")])
+@pytest.mark.parametrize(("size", "saved", "said"), [((8, 8), True, "8 x 8"), ((256, 384), False, "mine")])
 def test_an_image_that_does_not_fit_is_refused(shot, tmp_path, size, saved, said) -> None:
     file = tmp_path / "mine.png"
     image = save_image(file, size) if saved else bpy.data.images.new("mine", *size, alpha=True)

@@ -63,15 +63,16 @@ def test_the_distance_is_that_of_the_first_frame(shot) -> None:
 
 
 @pytest.mark.parametrize(
-    ("height", "points", "words"),
+    ("height", "points"),
     [
-        (3.0, [(0.0, 0.0, 4.0), (0.0, 0.0, 3.9)], "floor of the box is not seen there"),
-        (3.0, [(0.0, 3.0, 0.0), (0.0, 2.9, 0.0)], "outside the box"),
-        (0.1, [(0.0, 0.5, 0.0), (0.0, 0.2, 0.0)], "too near to the floor"),
+        (3.0, [(0.0, 0.0, 4.0), (0.0, 0.0, 3.9)]),
+        (3.0, [(0.0, 3.0, 0.0), (0.0, 2.9, 0.0)]),
+        (0.1, [(0.0, 0.5, 0.0), (0.0, 0.2, 0.0)]),
     ],
+    ids=["above the floor", "outside the box", "near to the floor"],
 )
-def test_a_click_that_tells_nothing_is_refused(shot, height, points, words) -> None:
+def test_a_click_that_tells_nothing_is_refused(shot, height, points) -> None:
     looking_down(shot).location.z = height
     bpy.context.view_layer.update()
-    with pytest.raises(ShotError, match=words):
+    with pytest.raises(ShotError):
         clicked(shot, *points)

@@ -402,5 +402,5 @@ def test_a_camera_beside_the_box_is_not_inside_it(shot) -> None:
         assert near["resolution"] == far["resolution"]
         assert near["min"][1] == pytest.approx(-1.0, abs=1e-3)
         assert near["max"][1] - near["min"][1] == pytest.approx(far["max"][1] - far["min"][1])
-    with pytest.raises(ShotError, match="inside the smoke's box"):
+    with pytest.raises(ShotError):
         with_camera_at(shot, -0.9)
