@@ -21,7 +21,13 @@ HEIGHT = 3.0
 """Longest side of the box (m)."""
 
 
-def write_clip(folder: Path, frames: int, extent: float = 1.0) -> Scene:
+def write_clip(
+    folder: Path,
+    frames: int,
+    extent: float = 1.0,
+    pixels: tuple[int, int] = PIXELS,
+    shape: tuple[int, int, int] = SHAPE,
+) -> Scene:
     """Write some frames into a folder, and return their scene.
 
     Parameters
@@ -32,16 +38,18 @@ def write_clip(folder: Path, frames: int, extent: float = 1.0) -> Scene:
         How many.
     extent
         Length of the smoke along each side of the box, in fractions of the usual. Smaller smoke is as opaque.
+    pixels, shape
+        Of the pictures, and voxels of the pictured smoke.
     """
     scene = Scene(
         clip=ClipSource(folder / "frame_####.exr", fps=24.0),
-        camera=Camera.look_at((0.0, -7.0, 0.0), (0.0, 0.0, 0.0), fov_y_degrees=30, size=PIXELS),
-        domain=_box(SHAPE, extent * HEIGHT),
+        camera=Camera.look_at((0.0, -7.0, 0.0), (0.0, 0.0, 0.0), fov_y_degrees=30, size=pixels),
+        domain=_box(shape, extent * HEIGHT),
         medium=Medium(extinction=5.0 / extent, albedo=0.9),
         lights=(DirectionalLight((0.5, 0.5, -0.7), (8.0, 8.0, 8.0)),),
         background=Background(color=(0.0, 0.0, 0.0)),
     )
-    for number, density in enumerate(built_in_densities(SHAPE, 0, frames), 1):
+    for number, density in enumerate(built_in_densities(shape, 0, frames), 1):
         write_image(folder / f"frame_{number:04d}.exr", render(density, scene))
     return scene
 

@@ -5,7 +5,6 @@ import math
 import pytest
 
 from benchmarks.machine import UNTIMED
-from benchmarks.pipeline import clip
 from benchmarks.pipeline.__main__ import Law, exponents
 from benchmarks.pipeline.clip import with_grid, write_clip
 from benchmarks.pipeline.worker import Run, run_apart
@@ -25,14 +24,13 @@ def test_laws_are_found_again():
     assert exponents(runs, [1e-6 * n**1.1 * fraction**0.3 for n, fraction in voxels]) == pytest.approx((1.1, 0.3))
 
 
-def test_a_run_is_timed_in_a_process_of_its_own(tmp_path, monkeypatch):
+def test_a_run_is_timed_in_a_process_of_its_own(tmp_path):
     try:
         vdb_module()
     except VdbUnavailable as missing:
         pytest.skip(str(missing))
-    monkeypatch.setattr(clip, "PIXELS", (48, 72))
-    monkeypatch.setattr(clip, "SHAPE", SHAPE)
-    with_grid(write_clip(tmp_path, UNTIMED + 1), SHAPE).save(tmp_path / "scene.toml")
+    scene = write_clip(tmp_path, UNTIMED + 1, pixels=(48, 72), shape=SHAPE)
+    with_grid(scene, SHAPE).save(tmp_path / "scene.toml")
     found = run_apart(tmp_path / "scene.toml", Settings.preset("draft"), SHAPE, 1, "wall")
     assert found.failure == ""
     assert 0 < found.seconds_density + found.seconds_velocity <= found.seconds

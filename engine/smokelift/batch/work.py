@@ -69,6 +69,7 @@ def finish_shot(
     say: Callable[[str], None] = lambda _text: None,
     pause: float = PAUSE_SECONDS,
     engine: Sequence[str] = ENGINE,
+    retries: Mapping[str, int] = RETRIES,
 ) -> Record:
     """Reconstruct a shot to its end, going on from the frames that are there, and return its record.
 
@@ -101,7 +102,7 @@ def finish_shot(
         if (there := len(read_index(shot).frames)) > frames:
             tries["stuck"], frames = 0, there
         tries[record.status] += 1
-        if tries[record.status] > RETRIES.get(record.status, 0):
+        if tries[record.status] > retries.get(record.status, 0):
             return record
         if record.status == "stuck":
             say(f"{shot.name}: {record.sentence} It is tried again in {pause:.0f} s.")
@@ -121,14 +122,18 @@ def run_here(shots: ShotMemory, task: Task, memory: int, workers: int) -> Iterat
         try:
             while waiting or running:
                 for shot in list(waiting):
-                    taken = sum(map(shots.__getitem__, running.values()))
-                    if not running or (len(running) < workers and taken + shots[shot] <= memory):
+                    if has_room(shots[shot], [shots[other] for other in running.values()], memory, workers):
                         waiting.remove(shot)
                         running[pool.submit(task, shot, stop)] = shot
                 for future in wait(running, POLL_SECONDS, FIRST_COMPLETED).done:
                     yield running.pop(future), future.result()
         finally:
             stop.set()
+
+
+def has_room(needed: int, taken: Sequence[int], memory: int, workers: int) -> bool:
+    """Whether a shot that needs so many bytes may start beside others that take theirs."""
+    return not taken or (len(taken) < workers and sum(taken) + needed <= memory)
 
 
 def _run(

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from command_line import QUICK, command, names, refused
 
+from smokelift import ClipSource
 from smokelift.output.images import write_image
 
 
@@ -22,6 +23,7 @@ def here(shot, plume, tmp_path, monkeypatch):
     (tmp_path / "bad.toml").write_text("[medium]\ncolors = 3\n")
     write_image(tmp_path / "black.png", np.zeros((4, 4, 3)))
     replace(plume.scene, clip=None).save(tmp_path / "clipless.toml")
+    replace(plume.scene, clip=ClipSource(tmp_path / "gone.mp4")).save(tmp_path / "gone.toml")
     return tmp_path
 
 
@@ -62,12 +64,9 @@ def test_a_run_that_cannot_be_is_refused_before_anything_is_written(here, shot, 
         (("--out", "others", "--thumbnail", "others/a.png", "--resume"), "holds other files"),
     ],
 )
-def test_what_cannot_be_written_is_refused_before_the_clip_is_read(here, shot, capsys, monkeypatch, words, said):
-    def look(*_arguments: object) -> None:
-        raise AssertionError("the clip was read")
-
-    monkeypatch.setattr("smokelift.pipeline.reconstruct", look)
-    assert said in refused(capsys, "reconstruct", shot, *words)
+def test_what_cannot_be_written_is_refused_before_the_clip_is_read(here, capsys, words, said):
+    """Whose file is missing."""
+    assert said in refused(capsys, "reconstruct", "gone.toml", *words)
     assert names(here / "others") == ["holiday.jpg"] and names(here / "deep") == []
 
 

@@ -2,20 +2,22 @@
 
 import json
 import shutil
+from types import SimpleNamespace
 
 import numpy as np
+import psutil
 import pytest
 from command_line import command, events_of, names, refused
 
 from smokelift import Clip, Sequence, render
-from smokelift.app.commands import directed
-from smokelift.direct.continuation import CONTRADICTED, ROOM, Continuation, continue_sequence
+from smokelift.direct.continuation import ROOM, Continuation, continue_sequence
+from smokelift.direct.simulation import Physics
 from smokelift.direct.state import open_source
 from smokelift.footage.image_files import read_image
 from smokelift.output.images import eight_bit
-from smokelift.report import cost
+from smokelift.output.writer import SequenceWriter
 from smokelift.scene import Camera, Scene, orbit
-from tests.engine.direct.rising import cube, write_stl
+from tests.engine.direct.rising import SCENE, at_rest, blob, course, cube, free, write_stl
 from tests.engine.output.small_sequence import needs_vdb
 
 
@@ -105,7 +107,7 @@ def test_what_is_resumed_is_counted_whole(finished, tmp_path, capsys) -> None:
 
 
 def test_one_sentence_says_what_stops_a_continuation(finished, tmp_path, capsys, monkeypatch) -> None:
-    """The box cannot grow, memory does not suffice for it, or a fitted buoyancy contradicts the clip."""
+    """The box cannot grow, or memory does not suffice for it."""
 
     def said(*words: object) -> list[str]:
         start = ("continue", finished, "--out", tmp_path / "out", "--npz", "--frames", 8, "--wind", 6, 0, 0)
@@ -115,12 +117,18 @@ def test_one_sentence_says_what_stops_a_continuation(finished, tmp_path, capsys,
     assert "dissolves" in sentence and "more room than 1" in sentence
     assert said("--room", 1, "--resume") == []
     shutil.rmtree(tmp_path / "out")
-    figures = {"origin": "simulated", CONTRADICTED: -0.4, "seconds_density": 0.0, "seconds_velocity": 0.0}
-    monkeypatch.setattr(directed, "continue_sequence", lambda *_, **__: iter([(1, figures), (2, figures)]))
-    monkeypatch.setattr(cost, "memory_free", lambda: 0)
-    memory, buoyancy = said()
-    assert "grows to 1 times" in memory
-    assert "without buoyancy: one of -0.4 m/s2 was fitted, but the smoke of the clip rises" in buoyancy
+    monkeypatch.setattr(psutil, "virtual_memory", lambda: SimpleNamespace(available=0))
+    assert "grows to 1 times" in said()[0]
+
+
+def test_a_fitted_buoyancy_that_contradicts_the_clip_is_said(tmp_path, capsys) -> None:
+    """Smoke that rises ever slower, as if it were heavy."""
+    with SequenceWriter(tmp_path / "smoke", SCENE, {}, npz=True) as writer:
+        for number, state in enumerate(course(free(Physics(-3.0, 0.0)), at_rest(blob((0.0, 0.0, 1.5))), 11), 1):
+            writer.write(number, state.density, tuple(-face for face in state.velocity.faces))
+    said = events_of(capsys, "continue", tmp_path / "smoke", "--out", tmp_path / "out", "--npz", "--frames", 1)
+    (note,) = (event for event in said if event.get("kind") == "contradicted buoyancy")
+    assert note["figures"]["motion"] == "rises" and note["figures"]["buoyancy"] < 0
 
 
 @pytest.mark.parametrize(

@@ -32,8 +32,6 @@ def test_a_command_of_the_tour_does_what_it_says(line, shot, finished, plume, tm
     if "smoke" not in made:
         (tmp_path / "smoke").symlink_to(finished)
     if words[0] == "preview":
-        for height in ("SHEET_HEIGHT", "PREVIEW_HEIGHT"):
-            monkeypatch.setattr(f"smokelift.output.preview.{height}", 112)
         words += ["--out", "."]
         made += ["contact_sheet.png", "preview.mp4"]
     assert command(*words) == 0

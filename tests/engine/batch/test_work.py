@@ -6,7 +6,6 @@ import signal
 import subprocess
 import sys
 import threading
-import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -15,7 +14,7 @@ import pytest
 
 import smokelift
 from smokelift.batch.shots import BatchShot, Record, is_finished, read_index, read_record
-from smokelift.batch.work import RETRIES, finish_shot, inspect_shot, run_here
+from smokelift.batch.work import finish_shot, has_room, inspect_shot, run_here
 
 SECONDS = 120.0
 """Longest wait for a batch to end, for a machine that does much else."""
@@ -80,9 +79,8 @@ def test_a_full_disk_is_waited_for(make_shot, finish, tmp_path, ledger) -> None:
     assert said[0] == "shot: The disk is full. It is tried again in 0 s."
 
 
-def test_a_full_disk_is_waited_for_as_long_as_frames_come(make_shot, finish, tmp_path, ledger, monkeypatch) -> None:
+def test_a_full_disk_is_waited_for_as_long_as_frames_come(make_shot, finish, tmp_path, ledger) -> None:
     """One try is allowed here without a new frame."""
-    monkeypatch.setitem(RETRIES, "stuck", 1)
     first, second = tmp_path / "first", tmp_path / "second"
     first.touch(), second.touch()
     shot = make_shot(n2=str(first), n3=str(second))
@@ -92,7 +90,7 @@ def test_a_full_disk_is_waited_for_as_long_as_frames_come(make_shot, finish, tmp
         said.append(text)
         first.unlink(missing_ok=True)
 
-    record = finish(shot, say=hear, pause=0.0)
+    record = finish(shot, say=hear, pause=0.0, retries={"stuck": 1})
     assert (record.status, record.runs, len(said), ledger(shot)) == ("stuck", 3, 2, [1, 2])
 
 
@@ -153,37 +151,38 @@ def shots(make_shot):
     return lambda *needs: {make_shot(f"shot{n}"): memory for n, memory in enumerate(needs)}
 
 
-class Worker:
-    """Works on a shot for a moment, and notes how many did so at a time."""
-
-    def __init__(self) -> None:
-        self.order: list[str] = []
-        self.most = self._now = 0
-        self._lock = threading.Lock()
-
-    def __call__(self, shot, stop) -> Record:
-        with self._lock:
-            self.order.append(shot.name)
-            self._now += 1
-            self.most = max(self.most, self._now)
-        time.sleep(0.05)
-        with self._lock:
-            self._now -= 1
-        return DONE
+@pytest.mark.parametrize(
+    ("needed", "taken", "room"),
+    [(10, [], True), (40, [], True), (10, [10, 10], True), (11, [10, 10], False), (1, [1, 1, 1], False)],
+)
+def test_a_shot_starts_where_memory_and_a_worker_are_left_and_alone_whatever_it_needs(needed, taken, room) -> None:
+    assert has_room(needed, taken, memory=30, workers=3) == room
 
 
 @pytest.mark.parametrize(("memory", "at_a_time", "most"), [(30, 8, 3), (100, 2, 2), (5, 8, 1)])
 def test_as_many_run_as_there_is_room_for(shots, memory, at_a_time, most) -> None:
-    work = Worker()
+    """None ends before so many have begun."""
+    together = threading.Barrier(most)
+
+    def work(_shot: BatchShot, _stop: threading.Event) -> Record:
+        together.wait(SECONDS)
+        return DONE
+
     ended = list(run_here(shots(*[10] * 6), work, memory, at_a_time))
     assert sorted(shot.name for shot, _ in ended) == [f"shot{n}" for n in range(6)]
-    assert work.most == most
 
 
 def test_a_small_shot_overtakes_a_large_one(shots) -> None:
-    work = Worker()
+    order, both = [], threading.Barrier(2)
+
+    def work(shot: BatchShot, _stop: threading.Event) -> Record:
+        order.append(shot.name)
+        if shot.name != "shot1":
+            both.wait(SECONDS)
+        return DONE
+
     list(run_here(shots(60, 60, 30), work, 100, 8))
-    assert work.order == ["shot0", "shot2", "shot1"]
+    assert sorted(order[:2]) == ["shot0", "shot2"]
 
 
 def test_leaving_early_ends_the_engines(make_shot, fake, engines, until, monkeypatch) -> None:

@@ -65,9 +65,7 @@ def test_a_strip_shows_consecutive_frames_from_the_side(plume, tmp_path, count, 
     assert top[0] - top[-1] == pytest.approx(rise * SHEET_HEIGHT / shown.framing.height, abs=10)
 
 
-def test_the_video_turns_while_it_plays(plume, tmp_path, monkeypatch) -> None:
-    for height in ("SHEET_HEIGHT", "PREVIEW_HEIGHT"):
-        monkeypatch.setattr(f"smokelift.output.preview.{height}", 112)
+def test_the_video_turns_while_it_plays(plume, tmp_path) -> None:
     still = [plume.densities[2]] * 5
     scene = plume.write(tmp_path / "clip", still, plume.scene)
     scene = replace(scene, clip=replace(scene.clip, fps=4.0))

@@ -32,15 +32,9 @@ def test_a_page_as_html_needs_no_other_file(tmp_path) -> None:
     assert all(picture.startswith("data:image/png;base64,iVBOR") for picture in pictures)
 
 
-def test_a_page_as_a_picture_shows_every_panel_and_line(tmp_path) -> None:
+def test_a_page_as_a_picture_shows_every_panel(tmp_path) -> None:
     write_page(tmp_path / "page.png", PAGE)
     with Image.open(tmp_path / "page.png") as picture:
         page = np.asarray(picture).astype(int)
     red = (page[..., 0] > 150) & (page[..., 1] < 50)
     assert red.sum() == len(PAGE.panels) * RED.shape[0] * RED.shape[1]
-    orange = (page[..., 0] > 200) & (page[..., 2] < 120) & ~red
-    above, below = np.flatnonzero(red.any(1))[[0, -1]]
-    assert orange[:above].any() and orange[below:].any()  # warnings above the pictures, what is undetermined below
-    ink = np.abs(page - page[-1, -1]).max(-1) > 60
-    assert not ink[:, -4:].any()
-    assert 5 < np.sum(np.diff(ink[below + 1 :].any(1).astype(int)) == 1) < 40
