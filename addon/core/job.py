@@ -106,6 +106,7 @@ class Job:
         self.sentence = ""  # the result, or the reason of a failure
         self.details: Mapping[str, Any] = {}  # the fields of the engine's "done" message
         self.status: int | None = None  # the engine's exit status; None before it ends
+        self.grace_seconds, self.drain_seconds = GRACE_SECONDS, DRAIN_SECONDS
         self._command = list(command)
         self._log_path = log
         self._before = before
@@ -160,7 +161,7 @@ class Job:
             self._process.kill()
         if self._process.poll() is not None:
             self._exited_at = self._exited_at or time.monotonic()
-            if self._output_ended or (self._lines.empty() and time.monotonic() - self._exited_at > DRAIN_SECONDS):
+            if self._output_ended or (self._lines.empty() and time.monotonic() - self._exited_at > self.drain_seconds):
                 self._end(self._process.returncode)
                 return True
         return changed
@@ -170,7 +171,7 @@ class Job:
         if self.outcome == "waiting":
             self.outcome, self.sentence = "cancelled", "Cancelled before it began."
         elif self.outcome == "running" and self._kill_at is None:
-            self._kill_at = time.monotonic() + GRACE_SECONDS
+            self._kill_at = time.monotonic() + self.grace_seconds
             self._close_input()
 
     def kill(self) -> None:

@@ -4,9 +4,10 @@ import json
 import os
 import shutil
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import bpy
@@ -84,6 +85,17 @@ def settings(shot) -> bpy.types.PropertyGroup:
 @pytest.fixture
 def clip(blender) -> bpy.types.MovieClip:
     return bpy.data.movieclips.load(str(EXAMPLE / "clip.mp4"))
+
+
+@pytest.fixture
+def stand_in(monkeypatch) -> Callable[..., None]:
+    """Lets a script stand in for the engine, which is another program, where a module of the add-on starts it."""
+
+    def put(module: ModuleType, script: str, *words: str) -> None:
+        command = [sys.executable, "-I", "-c", script, *words]
+        monkeypatch.setattr(module, "engine_command", lambda arguments: [*command, *arguments])
+
+    return put
 
 
 def made(

@@ -1,12 +1,10 @@
 """The element of a clip: what the engine is asked for, and what Blender shows of it."""
 
 import json
-import sys
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
-from unittest.mock import Mock
 
 import bpy
 import pytest
@@ -33,12 +31,11 @@ print(json.dumps({{"event": "done", "text": "Written."}}))
 
 
 @pytest.fixture
-def asked(shot, tmp_path, monkeypatch) -> Callable[[], tuple[list[str], dict[str, Any]]]:
+def asked(shot, tmp_path, stand_in) -> Callable[[], tuple[list[str], dict[str, Any]]]:
     """Gives what the engine was asked for: its arguments, and the tables of the scene file."""
     save_image(tmp_path / "red.exr", (2, 2), [0.25, 0.0, 0.0, 0.5] * 4)
     journal = tmp_path / "asked.json"
-    script = ENGINE.format(journal=str(journal), picture=str(tmp_path / "red.exr"))
-    monkeypatch.setattr(side_job, "engine_command", lambda words: [sys.executable, "-I", "-c", script, *words])
+    stand_in(side_job, ENGINE.format(journal=str(journal), picture=str(tmp_path / "red.exr")))
     smoke(shot).smokelift.output = str(tmp_path / "out")
 
     def read() -> tuple[list[str], dict[str, Any]]:
@@ -96,9 +93,9 @@ def test_render_element_writes_all_frames_that_are_used(settings, asked, tmp_pat
     assert side_job.writing_job.sentence == f"The element is in {folder}."
 
 
-def test_nothing_is_ended_half_written(shot, asked, monkeypatch) -> None:
-    monkeypatch.setattr(side_job.writing_job, "job", Mock())
-    monkeypatch.setattr(side_job.writing_job, "operator", "smokelift.render_element")
+def test_nothing_is_ended_half_written(shot, stand_in) -> None:
+    stand_in(side_job, "import sys; sys.stdin.read()")
+    side_job.writing_job.start(smoke(shot), [], lambda *_: None, "smokelift.render_element")
     assert not bpy.ops.smokelift.extract.poll()
     assert bpy.ops.smokelift.stop_writing() == {"FINISHED"}
     assert bpy.ops.smokelift.extract.poll()

@@ -1,7 +1,6 @@
 """The check of a shot: when the engine reads the clip anew, and when what it said or reads stays good."""
 
 import json
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -30,11 +29,10 @@ CUT = ("before", "after", "first", "last")
 
 
 @pytest.fixture(params=["30"])
-def engine(request, shot, tmp_path, monkeypatch) -> Iterator[Path]:
+def engine(request, shot, tmp_path, stand_in) -> Iterator[Path]:
     """The journal of an engine that reads for some seconds."""
-    command = [sys.executable, "-c", ENGINE, str(tmp_path / "journal"), request.param]
-    monkeypatch.setattr(side_job, "engine_command", lambda words: [*command, *words])
-    monkeypatch.setattr(shot_check, "_known", {})
+    stand_in(side_job, ENGINE, str(tmp_path / "journal"), request.param)
+    shot_check._known.clear()
     yield tmp_path / "journal"
     shot_check.check_job.stop()
 
@@ -80,15 +78,14 @@ def test_a_reading_can_be_stopped(shot, engine) -> None:
 
 
 @pytest.mark.parametrize("engine", ["0"], indirect=True)
-def test_a_run_is_a_reading_too(shot, engine, tmp_path, monkeypatch) -> None:
+def test_a_run_is_a_reading_too(shot, engine, tmp_path, stand_in) -> None:
     """Until a setting changes that matters; the page alone is made by a reading of its own."""
     said = [
         {"event": "note", "kind": "cut", "text": "A cut.", "doubt": True, "figures": dict.fromkeys(CUT, 1)},
         {"event": "start", "done": 0, "total": 6, **FOUND},
         {"event": "note", "kind": "empty frames", "text": "No smoke.", "doubt": True, "figures": {}},
     ]
-    run = f"for line in {[json.dumps(message) for message in said]!r}: print(line)"
-    monkeypatch.setattr(smoke_takes, "engine_command", lambda words: [sys.executable, "-c", run])
+    stand_in(smoke_takes, f"for line in {[json.dumps(message) for message in said]!r}: print(line)")
     state, obj = shot_check.state, smoke(shot)
     obj.smokelift.output = str(tmp_path)
     shot_check.state.settings = ""
@@ -106,8 +103,8 @@ def test_a_run_is_a_reading_too(shot, engine, tmp_path, monkeypatch) -> None:
     assert engine.read_text() == "read\n" * 2
 
 
-def test_a_run_does_not_read_the_clip_beside_a_check(shot, engine, tmp_path, monkeypatch) -> None:
-    monkeypatch.setattr(smoke_takes, "engine_command", lambda words: [sys.executable, "-c", ""])
+def test_a_run_does_not_read_the_clip_beside_a_check(shot, engine, tmp_path, stand_in) -> None:
+    stand_in(smoke_takes, "")
     smoke(shot).smokelift.output = str(tmp_path)
     shot_check._start(smoke(shot), needs_page=True)
     job = shot_check.check_job.job
