@@ -14,7 +14,7 @@ from command_line import ENVIRONMENT, command, refused
 
 from smokelift.app.progress import printable_lines
 from smokelift.output.index import SequenceError
-from smokelift.render import device
+from smokelift.render import DeviceError, device
 
 MISSING = ("inspect", "missing.toml")
 
@@ -125,6 +125,7 @@ LIMITS = "gives no more memory or threads"
         (of_system(errno.EAGAIN), 3, LIMITS, True),
         (of_system(errno.ENOMEM), 3, LIMITS, True),
         (RuntimeError("can't start new thread"), 3, LIMITS, True),
+        (DeviceError("No GPU was found."), 3, "No GPU", False),
         (unwritten(of_system(errno.ENOSPC)), 2, "It could not be written.", True),
         (unwritten(of_system(errno.EACCES)), 2, "It could not be written.", False),
         (unwritten(None), 2, "It could not be written.", False),

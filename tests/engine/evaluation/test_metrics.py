@@ -1,6 +1,7 @@
 """Metrics: known values, limits and refusals."""
 
 import math
+from functools import partial
 
 import numpy as np
 import pytest
@@ -43,11 +44,6 @@ def test_ssim_limits() -> None:
     assert metrics.ssim(picture, picture) == pytest.approx(1.0)
     blurred = (picture + np.roll(picture, 1, 0)) / 2
     assert metrics.ssim(picture, np.roll(picture, 7, 1)) < metrics.ssim(picture, blurred) < 1.0
-    with pytest.raises(ValueError, match="11 x 11"):
-        metrics.ssim(picture[:10], picture[:10])
-    for function in (metrics.ssim, metrics.psnr):
-        with pytest.raises(ValueError, match="peak"):
-            function(picture, picture, peak=0)
 
 
 def test_volume_error_and_mass() -> None:
@@ -98,8 +94,6 @@ def test_mean_divergence() -> None:
     broken = np.where(x[..., None] > 2, 100.0, outward)
     assert metrics.mean_divergence(broken, 0.5, mask) == pytest.approx(4.0)
     assert metrics.mean_divergence(broken, 0.5) > 5.0
-    with pytest.raises(ValueError, match="mask"):
-        metrics.mean_divergence(outward, 0.5, x == 0)
 
 
 def test_a_flow_without_divergence_on_faces_has_none() -> None:
@@ -123,33 +117,35 @@ def test_warp_error() -> None:
     way[..., 0] = 2.0
     assert metrics.warp_error(before, after, way) == pytest.approx(0.0)
     assert metrics.warp_error(before, after, -way) > 1.0
-    with pytest.raises(ValueError):  # NumPy would refuse it in other words
-        metrics.warp_error(before, after, way[..., :2])
 
 
 def test_flicker() -> None:
     steady = np.arange(6.0)[:, None] + np.ones(4)
     assert metrics.flicker(steady) == pytest.approx(0.0)
     assert metrics.flicker(1 + 0.1 * np.array([1, -1, 1, -1])) == pytest.approx(0.4, rel=0.01)
+
+
+ONES, SPOILT = np.ones((12, 12, 3)), np.ones((12, 12, 3))
+SPOILT[0, 0, 0] = np.nan
+PAIRS = ((ONES, SPOILT), (SPOILT, ONES), (ONES, ONES[1:]), (ONES[:0], ONES[:0]))
+NOTHING, VOLUME, FLOW = np.zeros((12, 12), bool), np.ones((6, 7, 8)), np.ones((6, 7, 8, 3))
+MASKED = (metrics.psnr, metrics.volume_error, metrics.velocity_error)
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        *(partial(function, *pair) for function in (*MASKED, metrics.ssim) for pair in PAIRS),
+        *(partial(function, ONES, ONES, mask) for function in MASKED for mask in (NOTHING, ~NOTHING[1:])),
+        partial(metrics.volume_error, VOLUME, VOLUME, VOLUME == 0),
+        partial(metrics.mean_divergence, FLOW, 0.5, np.indices((6, 7, 8))[0] == 0),
+        *(partial(function, ONES, ONES, peak=0) for function in (metrics.psnr, metrics.ssim)),
+        partial(metrics.ssim, ONES[:10], ONES[:10]),
+        partial(metrics.warp_error, VOLUME, VOLUME, FLOW[..., :2]),
+        partial(metrics.flicker, ONES[:2]),
+        partial(metrics.mass, SPOILT, 1.0),
+    ],
+)
+def test_what_cannot_be_measured_is_refused(call) -> None:
     with pytest.raises(ValueError):
-        metrics.flicker(steady[:2])
-
-
-@pytest.mark.parametrize("function", [metrics.psnr, metrics.ssim, metrics.volume_error, metrics.velocity_error])
-def test_bad_arrays_are_refused(function) -> None:
-    good = np.ones((12, 12, 3))
-    bad = good.copy()
-    bad[0, 0, 0] = np.nan
-    for pair in ((good, bad), (bad, good), (good, good[1:]), (good[:0], good[:0])):
-        with pytest.raises(ValueError):
-            function(*pair)
-
-
-def test_masks_must_fit_and_count_something() -> None:
-    volume, flow = np.ones((4, 4, 4)), np.ones((4, 4, 3))
-    for mask in (np.zeros((4, 4), bool), np.ones((3, 4), bool)):
-        for name, values in (("psnr", volume), ("volume_error", volume), ("velocity_error", flow)):
-            with pytest.raises(ValueError, match="mask"):
-                getattr(metrics, name)(values, values, mask)
-    with pytest.raises(ValueError):
-        metrics.mass(np.array([math.inf]), 1.0)
+        call()

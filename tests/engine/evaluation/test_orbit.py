@@ -1,25 +1,14 @@
 """Smoke on a turntable, lit; its scores by azimuth: what is perfect, and what each figure catches."""
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from smokelift.evaluation import orbit
-from smokelift.evaluation.orbit import BANDS, SHAPES, Orbit, gray, orbit_scores
+from smokelift.evaluation.orbit import AZIMUTHS, BANDS, SHAPES, Orbit, gray, orbit_scores
 from smokelift.scene import Background, DirectionalLight, Medium, PointLight
 
-FRAMES, AZIMUTHS = 3, (30, 60, 90, 120, 150)
-
-
-@pytest.fixture(scope="module", autouse=True)
-def half_of_the_azimuths() -> Iterator[None]:
-    """Every other picture is enough here, and the one that is compared with as far away."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(orbit, "AZIMUTHS", AZIMUTHS)
-        patch.setattr(orbit, "OWN_STEP", 2)
-        yield
+FRAMES = 3
 
 
 @pytest.mark.parametrize(

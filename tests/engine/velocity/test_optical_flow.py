@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from smokelift.pipeline import compose
 from smokelift.scene import Camera, Domain, look_at_matrix
 from smokelift.scene.camera import project_points
-from smokelift.setup.settings import Settings
 from smokelift.transport import Velocity, face_shapes, on_faces, project
 from smokelift.velocity.optical_flow import PicturePair, averaged_along, correct_by_optical_flow
 from tests.engine.transport.random_fields import random_velocity, uniform
@@ -79,11 +77,6 @@ def test_a_picture_without_smoke_or_structure_corrects_nothing(picture: np.ndarr
     pictures = PicturePair(picture, picture, camera("perspective"), DOMAIN)
     found = correct_by_optical_flow(rest(), pictures, np.zeros(COARSE, np.float32), DT)
     assert not any(component.any() for component in found.faces)
-
-
-def test_the_paper_uses_no_optical_flow() -> None:
-    assert compose(Settings.preset()).optical_flow
-    assert not compose(Settings.preset(method="paper")).optical_flow
 
 
 @pytest.mark.parametrize("size", [(1, 1), (1, 9), (9, 1)])
