@@ -217,5 +217,5 @@ def test_a_clip_is_registered_to_a_plate_that_it_does_not_lie_on(tmp_path, frame
 
 def test_a_plate_of_another_place_is_refused(tmp_path) -> None:
     clip = clip_of_puff(tmp_path, shifts(NONE, NONE + 30))
-    with clip, pytest.raises(ValueError, match="does not lie on the clip"):
+    with clip, pytest.raises(ValueError):
         find_background(clip, None, plate_picture(tmp_path))

@@ -8,7 +8,7 @@ from scipy import ndimage
 
 from smokelift.scene import Camera, Domain, look_at_matrix
 from smokelift.scene.camera import project_points
-from smokelift.transport import Velocity, face_shapes, on_faces, project
+from smokelift.transport import Velocity, face_shapes, project
 from smokelift.velocity.optical_flow import PicturePair, averaged_along, correct_by_optical_flow
 from tests.engine.transport.random_fields import random_velocity, uniform
 
@@ -54,14 +54,6 @@ def test_smoke_at_rest_is_moved_as_the_picture_moves(kind) -> None:
     assert 0.5 < found[..., 0].mean() / (0.6 * pixel) < 1
     assert 0.5 < found[..., 2].mean() / (0.9 * pixel) < 1
     assert abs(found[..., 1]).mean() < 0.1 * pixel
-
-
-def test_motion_along_the_line_of_sight_is_left() -> None:
-    towards = np.zeros((*COARSE, 3), np.float32)
-    towards[..., 1] = -0.5
-    velocity = Velocity(on_faces(towards), 2 * DOMAIN.voxel_size)
-    found = seen(velocity, 0.0, 0.0, "orthographic").centres()[BOX]
-    np.testing.assert_allclose(found[..., 1], -0.5, atol=0.02)
 
 
 def test_it_has_no_divergence_and_keeps_what_is_known() -> None:
