@@ -152,8 +152,8 @@ def find_engines(folders: Iterable[Path], version: str) -> dict[tuple[str, str],
     return found
 
 
-def stage_add_on(product: Product, manifest: Mapping[str, Any]) -> None:
-    """Put the add-on's files beside its libraries, with a manifest that says what the zip is for."""
+def stage_add_on(product: Product, manifest: Mapping[str, Any], manual: Path = MANUAL) -> None:
+    """Put the add-on's files and manual beside its libraries, with a manifest that says what the zip is for."""
     stage = product.stage
     complete = {**manifest, "id": product.name, "version": product.version, "platforms": [product.platform.name]}
     complete["blender_version_min"], before = BLENDERS[product.python]
@@ -164,8 +164,8 @@ def stage_add_on(product: Product, manifest: Mapping[str, Any]) -> None:
         (stage / "__init__.py").write_text(GPU_ADD_ON, encoding="utf-8")
     else:
         shutil.copytree(ROOT / "addon", stage, ignore=shutil.ignore_patterns("__pycache__"), dirs_exist_ok=True)
-        if MANUAL.is_dir():
-            shutil.copytree(MANUAL, stage / MANUAL.name, ignore=shutil.ignore_patterns("*.map", "*.gz"))
+        if manual.is_dir():
+            shutil.copytree(manual, stage / manual.name, ignore=shutil.ignore_patterns("*.map", "*.gz"))
         else:
             print(f"{product.file}: the manual is left out, as there is none in build/manual (make manual).")
     shutil.copy(ROOT / "LICENSE", stage)

@@ -87,12 +87,15 @@ class Product:
         What it is for.
     python
         The version of Python that it is for.
+    folder
+        Where it is put together.
     """
 
     name: str
     version: str
     platform: Platform
     python: str
+    folder: Path = STAGE
 
     @property
     def file(self) -> str:
@@ -102,7 +105,7 @@ class Product:
     @property
     def stage(self) -> Path:
         """Folder that is zipped."""
-        return STAGE / self.file.removesuffix(".zip")
+        return self.folder / self.file.removesuffix(".zip")
 
     @property
     def libraries(self) -> Path:

@@ -8,7 +8,6 @@ from typing import Any
 import pytest
 
 import build_extension
-import extension_products
 from build_extension import GPU_ADD_ON, pack
 from engine_wheels import PYTHONS
 from extension_libraries import PINS
@@ -44,13 +43,11 @@ def test_the_same_files_make_the_same_zip(tmp_path) -> None:
 
 
 @pytest.mark.parametrize("name", PINS)
-def test_the_manifest_says_what_the_zip_is_for(name, tmp_path, monkeypatch) -> None:
-    monkeypatch.setattr(extension_products, "STAGE", tmp_path)
-    monkeypatch.setattr(build_extension, "MANUAL", tmp_path / "none")
+def test_the_manifest_says_what_the_zip_is_for(name, tmp_path) -> None:
     manifest = tomllib.loads((build_extension.ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))
-    product = Product(name, "2.3.4", LINUX, "3.11")
+    product = Product(name, "2.3.4", LINUX, "3.11", tmp_path)
     product.libraries.mkdir(parents=True)
-    build_extension.stage_add_on(product, manifest)
+    build_extension.stage_add_on(product, manifest, manual=tmp_path / "none")
     said = tomllib.loads((product.stage / "blender_manifest.toml").read_text(encoding="utf-8"))
     assert (said["id"], said["version"], said["platforms"]) == (name, "2.3.4", ["linux-x64"])
     assert (said["blender_version_min"], said["blender_version_max"]) == ("4.2.0", "5.1.0")

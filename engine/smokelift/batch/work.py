@@ -70,12 +70,13 @@ def finish_shot(
     pause: float = PAUSE_SECONDS,
     engine: Sequence[str] = ENGINE,
     retries: Mapping[str, int] = RETRIES,
+    grace: float = GRACE_SECONDS,
 ) -> Record:
     """Reconstruct a shot to its end, going on from the frames that are there, and return its record.
 
     The engine runs only while nobody else has the shot's lock. After a crash it is tried again. A failure that passes
     is waited for: `say` is called with what it is, and `pause` is the seconds until the next try. Once `stop` is set
-    the work ends; finished frames stay.
+    the work ends, by force after `grace` seconds; finished frames stay.
     """
     words = ["reconstruct", str(shot.input), "--out", str(shot.directory), "--thumbnail", str(shot.file("png"))]
     lock, tries, frames = Lock(shot.folder / f".{shot.name}.lock"), Counter[str](), 0
@@ -90,7 +91,7 @@ def finish_shot(
             elif not (is_finished(shot, record) or stop.is_set()):
                 record = replace(record, status="running", sentence="", runs=record.runs + 1)
                 record.write(shot)
-                record, _ = _run(shot, record, [*words, "--resume", *shot.options], stop, engine)
+                record, _ = _run(shot, record, [*words, "--resume", *shot.options], stop, engine, grace)
                 record.write(shot)
         except OSError as error:  # the storage itself
             record = replace(read_record(shot), status="stuck", sentence=str(error))
@@ -137,7 +138,12 @@ def has_room(needed: int, taken: Sequence[int], memory: int, workers: int) -> bo
 
 
 def _run(
-    shot: BatchShot, record: Record, words: Sequence[str], stop: threading.Event, engine: Sequence[str]
+    shot: BatchShot,
+    record: Record,
+    words: Sequence[str],
+    stop: threading.Event,
+    engine: Sequence[str],
+    grace: float = GRACE_SECONDS,
 ) -> tuple[Record, dict[str, Any]]:
     """Run the engine and log what it says, as far as the disk allows; the record at its end, and its last message."""
     began, peak, last_words = time.monotonic(), [record.memory], "it said nothing"
@@ -147,7 +153,7 @@ def _run(
         shot.file("log").open("ab", buffering=0) as log,
         subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=subprocess.STDOUT) as process,
     ):
-        threading.Thread(target=_watch, args=(process, stop, peak), daemon=True).start()
+        threading.Thread(target=_watch, args=(process, stop, peak, grace), daemon=True).start()
         try:
             for line in process.stdout or ():
                 with suppress(OSError):
@@ -179,13 +185,13 @@ def _run(
     return ended, message
 
 
-def _watch(process: subprocess.Popen[bytes], stop: threading.Event, peak: list[int]) -> None:
-    """Measure the memory of a process, and end it when that is asked."""
+def _watch(process: subprocess.Popen[bytes], stop: threading.Event, peak: list[int], grace: float) -> None:
+    """Measure the memory of a process, and end it when that is asked, by force after a grace of seconds."""
     while process.poll() is None:
         with suppress(psutil.Error):  # it has ended already
             peak[0] = max(peak[0], psutil.Process(process.pid).memory_info().rss)
         if stop.wait(POLL_SECONDS) and process.stdin is not None:
             with suppress(OSError, subprocess.TimeoutExpired):
                 process.stdin.close()
-                process.wait(GRACE_SECONDS)
+                process.wait(grace)
             process.kill()

@@ -14,7 +14,6 @@ FAKE = (sys.executable, "-S", str(Path(__file__).with_name("fake_engine.py")))
 if __name__ == "__main__":
     # a test run in the background may ignore SIGINT, which children inherit
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    work.GRACE_SECONDS = 0.1
     batch.inspect_shot = functools.partial(work.inspect_shot, engine=FAKE)
-    batch.finish_shot = functools.partial(work.finish_shot, engine=FAKE)
+    batch.finish_shot = functools.partial(work.finish_shot, engine=FAKE, grace=0.1)
     sys.exit(smokelift_command.main())

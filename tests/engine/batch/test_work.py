@@ -185,12 +185,11 @@ def test_a_small_shot_overtakes_a_large_one(shots) -> None:
     assert sorted(order[:2]) == ["shot0", "shot2"]
 
 
-def test_leaving_early_ends_the_engines(make_shot, fake, engines, until, monkeypatch) -> None:
+def test_leaving_early_ends_the_engines(make_shot, fake, engines, until) -> None:
     """The caller leaves after the first shot; of the others an engine has to be killed."""
-    monkeypatch.setattr("smokelift.batch.work.GRACE_SECONDS", 0.1)
     quick, gentle = make_shot("quick", frames=1), make_shot("gentle", frames=1000, seconds=0.02)
     stubborn = make_shot("stubborn", frames=1000, seconds=0.02, stubborn=True)
-    task = functools.partial(finish_shot, engine=fake)
+    task = functools.partial(finish_shot, engine=fake, grace=0.1)
     ended = run_here(dict.fromkeys((quick, gentle, stubborn), 0), task, 1, 3)
     assert next(ended)[0] == quick
     until(lambda: read_index(gentle).frames and read_index(stubborn).frames)

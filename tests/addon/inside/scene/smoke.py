@@ -122,12 +122,13 @@ def test_results_are_picked_named_and_deleted(shot, tmp_path) -> None:
     assert bpy.ops.smokelift.name_take(take=str(first.directory), title="Slow and thick") == {"FINISHED"}
     assert Take(first.directory).read().title == "Slow and thick"
     assert first.arguments()[0] == "reconstruct"
-    with pytest.raises(RuntimeError, match="show another one first"):
+    with pytest.raises(RuntimeError):
         bpy.ops.smokelift.remove_take(take=str(first.directory))
     assert bpy.ops.smokelift.remove_take(take=str(second.directory)) == {"FINISHED"}
     assert takes(tmp_path / "out") == [first]
-    with pytest.raises(RuntimeError, match="no finished frame"):
+    with pytest.raises(RuntimeError):
         bpy.ops.smokelift.show_take(take=str(second.directory))
+    assert volume.shown_take(smoke(shot)) == first
 
 
 def test_files_begin_at_the_start_number(shot, tmp_path) -> None:
