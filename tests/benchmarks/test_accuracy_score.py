@@ -7,19 +7,11 @@ from benchmarks.accuracy.scenes import KnownScene
 from benchmarks.accuracy.score import score
 from benchmarks.baked import BLACK
 from smokelift.render import scene_renderer
-from smokelift.scene import Background, Camera, DirectionalLight, Domain, Medium, Scene, completed, orbit
-from tests.benchmarks.ball import truth
+from smokelift.scene import completed, orbit
+from tests.benchmarks.ball import scene, truth
 
-SHAPE, FRAMES, VOXEL = (16, 16, 24), 10, 0.1
-DOMAIN = Domain((-0.8, -0.8, 0), (0.8, 0.8, 2.4), SHAPE)
-SCENE = Scene(
-    camera=Camera.look_at((0, -6, 1.2), (0, 0, 1.2), fov_y_degrees=27, size=(48, 72)),
-    domain=DOMAIN,
-    medium=Medium(extinction=5.0, albedo=0.9),
-    lights=(DirectionalLight((0.3, 0.5, -0.8), (12.0, 12.0, 12.0)),),
-    background=Background(color=(0.0, 0.0, 0.0)),
-    scattering="single",
-)
+SHAPE, FRAMES, VOXEL = (16, 16, 24), 10, 0.125
+SCENE = scene(SHAPE, (48, 72), 5.0)
 
 
 def density(frame: int) -> np.ndarray:
@@ -34,7 +26,7 @@ def known(tmp_path_factory) -> KnownScene:
     path = tmp_path_factory.mktemp("ball") / "scene.toml"
     SCENE.save(path)
     known = truth(np.stack([density(frame) for frame in range(FRAMES)]), VOXEL)
-    cameras = {str(angle): orbit(SCENE.camera, DOMAIN, angle) for angle in (0, 20, 45, 90)}
+    cameras = {str(angle): orbit(SCENE.camera, SCENE.domain, angle) for angle in (0, 20, 45, 90)}
     renderers = {view: scene_renderer(completed(SCENE), camera, BLACK) for view, camera in cameras.items()}
     span = range(FRAMES)
     seen = {(view, k): renderer.image(known.density(k)) for view, renderer in renderers.items() for k in span}
