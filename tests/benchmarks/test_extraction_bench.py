@@ -84,7 +84,7 @@ def test_what_is_composed_stays_and_is_not_taken_for_another_clip(smoke, folder,
     written = (before_planks / "clip.mp4").stat().st_mtime_ns
     compose(smoke, "planks", Filming(), before_planks)
     assert (before_planks / "clip.mp4").stat().st_mtime_ns == written
-    with pytest.raises(ValueError, match="another OUT"):
+    with pytest.raises(ValueError, match="OUT"):
         compose(Baked.load(folder, 3), "planks", Filming(), before_planks)
 
 
