@@ -37,7 +37,6 @@ RETRIES = {"crashed": 2, "stuck": 120}
 
 _STATUS: dict[int, Status] = {DONE: "done", CANCELLED: "cancelled", BAD_INPUT: "refused", NO_DEVICE: "refused"}
 
-
 Task = Callable[[BatchShot, threading.Event], Record]
 """Work on a shot, and what ends it; a worker of a cluster has to be able to import it."""
 
@@ -50,11 +49,10 @@ def inspect_shot(shot: BatchShot, stop: threading.Event, engine: Sequence[str] =
     record = read_record(shot)
     if record.forecast is not None:
         return record
-    # `inspect` writes nothing
     options = [word for word in shot.options if not word.startswith(("--npz", "--start-number"))]
     try:
         shot.folder.mkdir(parents=True, exist_ok=True)
-        ended, said = _run(shot, record, ["inspect", str(shot.input), *options], stop, engine)
+        ended, said = _run(shot, record, ["inspect", str(shot.input), *options], stop, engine, GRACE_SECONDS)
         if ended.status == "done":
             ended = replace(record, forecast={name: said[name] for name in ("frames", "seconds", "memory")})
             ended.write(shot)
@@ -83,11 +81,9 @@ def finish_shot(
     while True:
         try:
             shot.folder.mkdir(parents=True, exist_ok=True)
-            free = lock.acquire()
-            record = read_record(shot)
+            free, record = lock.acquire(), read_record(shot)
             if not free:
-                sentence = f"{shot.directory}: another batch is at work on this shot."
-                record = replace(record, status="stuck", sentence=sentence)
+                record = replace(record, status="stuck", sentence=f"{shot.directory}: another batch is at work.")
             elif not (is_finished(shot, record) or stop.is_set()):
                 record = replace(record, status="running", sentence="", runs=record.runs + 1)
                 record.write(shot)
@@ -138,12 +134,7 @@ def has_room(needed: int, taken: Sequence[int], memory: int, workers: int) -> bo
 
 
 def _run(
-    shot: BatchShot,
-    record: Record,
-    words: Sequence[str],
-    stop: threading.Event,
-    engine: Sequence[str],
-    grace: float = GRACE_SECONDS,
+    shot: BatchShot, record: Record, words: Sequence[str], stop: threading.Event, engine: Sequence[str], grace: float
 ) -> tuple[Record, dict[str, Any]]:
     """Run the engine and log what it says, as far as the disk allows; the record at its end, and its last message."""
     began, peak, last_words = time.monotonic(), [record.memory], "it said nothing"
