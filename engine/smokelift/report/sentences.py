@@ -157,6 +157,10 @@ SENTENCES: Mapping[str, str] = {
         "What is behind the smoke does not show how much of it the smoke hides, so alpha is a convention: that of "
         "evenly lit smoke whose thickest part is opaque."
     ),
+    "no smoke found": (
+        "No smoke found: nothing differs from the background by more than the clip's noise does, so all frames in "
+        "{path} are empty."
+    ),
     "no smoke examined": "No smoke found in {frames:examined frame}, so nothing about it could be measured.",
     "no smoke beside strokes": (
         "Nothing counts as smoke where red or blue is painted: if smoke passes there, erase these strokes. If it does "

@@ -114,11 +114,8 @@ def reconstruct(options: argparse.Namespace, say: Reporter) -> None:
         given = scene.background is not None and not scene.background.estimated
         strokes = next((found.figures for found in shot.findings if found.kind == "strokes"), {})
         painted = bool(strokes.get("other") or strokes.get("behind"))
-        raise ValueError(
-            f"No smoke found: nothing differs from the background by more than the clip's noise does, so all frames "
-            f"in {out} are empty. "
-            f"{sentence(what_helps(shot.clip, given, painted))}"
-        )
+        empty = Finding("no smoke found", {"path": str(out)}, doubt=True)
+        raise ValueError(" ".join(map(sentence, (empty, what_helps(shot.clip, given, painted)))))
     for doubt in shortcomings(figures, burns=shot.fire is not None):
         say.note(doubt)
     seconds = time.monotonic() - began[0] + seconds_before(sequence, new)
