@@ -154,6 +154,8 @@ class Simulation:
         solid = self.surroundings.solid(step, self.dt)
         velocity = self.velocity(state, step, solid)
         obstacle = None if solid is None else solid.voxels
+        if step == 1 and obstacle is not None:  # what an obstacle is put into vanishes; later it displaces smoke
+            state = state.scaled(np.float32(1) - obstacle)
         density = self._advected(state.density, velocity, obstacle)
         density *= np.float32(math.exp(-self.physics.dissipation * self.dt))
         self.inflow.density_into(density, step, obstacle)

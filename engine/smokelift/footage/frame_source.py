@@ -43,8 +43,8 @@ OPAQUE = 0.999
 """Alpha from which on a pixel is opaque: less than a step of 8 bits below 1."""
 
 MAX_ALPHA_BESIDE = 0.5
-"""Mean alpha below which the picture nearest to opaque ones shows that they lack theirs: smoke does not go from half of
-a picture, or less, to opaque all over it from one frame to the next."""
+"""Mean alpha below which the pictures beside opaque ones show that they lack theirs: smoke does not go from half of a
+picture, or less, to opaque all over it and back."""
 
 Edges = npt.NDArray[np.int32]
 Sample = TypeVar("Sample")
@@ -183,18 +183,19 @@ class FrameSource:
 
 
 def alpha_background_of(layers: Iterable[Layer]) -> float | None:
-    """Return the linear gray to show pictures of a clip over; None if they are opaque.
+    """Return the linear gray to show pictures of a clip over; None if they are opaque, or most have no alpha.
 
     An alpha channel is the matte of the smoke, whatever stands behind it. Such pictures are shown over a color that is
     known for certain: white behind dark smoke, black behind bright smoke.
     """
-    light, opacity, opaque = 0.0, 0.0, True
+    light, opacity, opaque, without = 0.0, 0.0, True, 0
     for picture, alpha in layers:
+        without += 1 if alpha is None else -1
         if alpha is not None and mean_alpha(alpha) < 1:
             light += float(picture.mean(-1).sum(dtype=np.float64))
             opacity += float(alpha.sum(dtype=np.float64))
             opaque = False
-    if opaque:
+    if opaque or without > 0:
         return None
     return 1.0 if opacity > 0 and linear_to_srgb(light / opacity) < 0.5 else 0.0
 
@@ -236,7 +237,7 @@ class ImageSequence(FrameSource):
 
     def read(self, n: int) -> StoredPicture:
         layer = self._layer(n)
-        if self.alpha_background is not None and mean_alpha(layer[1]) == 1 and self._alpha_beside(n) < MAX_ALPHA_BESIDE:
+        if self.alpha_background is not None and mean_alpha(layer[1]) == 1 and self._lacks_alpha(n, layer[1] is None):
             raise DamagedFrameError(f"{self.files[n]}: lacks the alpha that the pictures beside it have")
         image = self.shown(layer)
         width, height = image.size
@@ -249,10 +250,13 @@ class ImageSequence(FrameSource):
         alpha = None if image.alpha is None else area_average(image.alpha, *size)
         return StoredPicture(area_average(image.values, *size), alpha=alpha)
 
-    def _alpha_beside(self, n: int) -> float:
-        """The mean alpha of the nearest picture that is not opaque; 1 if all are."""
-        nearest = sorted(range(self.count), key=lambda other: abs(other - n))
-        return next((mean for mean in map(self._mean_alpha, nearest) if mean < 1), 1.0)
+    def _lacks_alpha(self, n: int, without: bool) -> bool:
+        """Whether pictures beside an opaque one show that it lacks its alpha: those on both sides, if it is not
+        ``without`` the channel.
+        """
+        sides = range(n - 1, -1, -1), range(n + 1, self.count)
+        means = [next((mean for mean in map(self._mean_alpha, side) if mean < 1), 1.0) for side in sides]
+        return (min if without else max)(means) < MAX_ALPHA_BESIDE
 
     def _read_mean_alpha(self, n: int) -> float:
         """The mean alpha of a picture; 1 of one that cannot be read."""
@@ -262,7 +266,12 @@ class ImageSequence(FrameSource):
 
     def _stored(self, n: int) -> Codes | Layer:
         try:
-            return read_stored(self.files[n])
+            stored = read_stored(self.files[n])
+            if not all(
+                np.isfinite(part).all() for part in (stored if isinstance(stored, tuple) else ()) if part is not None
+            ):
+                raise ImageError(f"{self.files[n]}: holds values that are not finite")
+            return stored
         except PictureKindError as error:
             raise ClipError(str(error)) from error
         except ImageError as error:

@@ -293,7 +293,8 @@ def json_value(value: Any) -> Any:
 def other_program(index: Index) -> str:
     """Return in words how what computed a run differs from this program, or an empty string."""
     there, now = ({**found, "python": ""} for found in (index.versions, _software_versions()))  # a patch is none
-    return _difference("versions", there, now)
+    code = there.pop("code", None) != now.pop("code")
+    return _difference("versions", there, now) or "its code has changed" * code
 
 
 def first_change(before: Index, now: Index) -> str:

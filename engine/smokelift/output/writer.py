@@ -311,10 +311,10 @@ def _earlier_run(directory: Path, resume: bool) -> Index | None:
             f"{directory}: holds other files ({foreign[0]}); nothing was overwritten, choose an empty directory"
         )
     there = Index.read(directory) if has_index else None
-    if there is not None and resume and (what := other_program(there)):
+    if there is not None and resume and not there.complete and (what := other_program(there)):
         raise SequenceError(
             f"{directory}: was begun by another version of Smokelift or of a library ({what}), so new frames would not "
-            "fit the finished ones, which stay; go on with that version, or begin anew in another directory"
+            "fit the finished ones, which stay; go on with that version, or begin anew under another name"
         )
     if there is None or resume:
         return there

@@ -140,7 +140,8 @@ def extract(clip: Clip, scene: Scene) -> Extraction:
         samples = estimate.samples
         if estimate.hot.burn:
             doused = sample_smoke(without_fire(estimate.clip, estimate.plate), estimate.plate)
-            samples = doused if doused.smoky else samples
+            # where most of the light goes with the fire, the smoke is not told apart from it
+            samples = doused if doused.change > 0.5 * samples.change else samples
         source = source_radiance(samples).astype(np.float32)
         if estimate.samples.smoky and not measured:
             findings.append(Finding("alpha of evenly lit smoke", about="alpha", source="assumed"))

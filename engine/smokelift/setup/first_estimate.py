@@ -113,16 +113,23 @@ class SmokeSamples:
         return bool(np.sum(np.maximum(change, 0)) >= np.sum(np.maximum(-change, 0)))
 
     @property
+    def change(self) -> float:
+        """Radiance by which smoke changes its background, summed over its pixels and channels."""
+        return float(np.abs(self.colors - self.behind).sum(dtype=np.float64))
+
+    @property
     def contrary(self) -> float:
         """Part of the light by which smoke changes its background that leads away from its source radiance, or past it.
 
-        Smoke moves every color towards that; a gray one is taken, which explains most. If the background holds smoke,
-        what the smoke leaves of it changes the other way, as far as it had changed that.
+        Smoke moves every color towards that: one that explains most, gray or of the hue that changes most. If the
+        background holds smoke, what the smoke leaves of it changes the other way, as far as it had changed that.
         """
         step = 1 + len(self.colors) // CHECKED_PIXELS
         behind, change = self.behind[::step], (self.colors - self.behind)[::step]
-        fits = []
-        for source in np.linspace(0, 1.5 * self.colors.max(initial=0), SOURCES, dtype=np.float32):
+        fits, brightest = [], 1.5 * self.colors.max(initial=0)
+        own = np.maximum(np.abs(change).sum(-1) @ self.colors[::step], 1e-9)
+        hues = np.ones(3, np.float32), own / own.max()
+        for source in (brightness * hue for hue in hues for brightness in np.linspace(0, brightest, SOURCES)):
             distance = np.linalg.norm(source - behind, axis=-1)
             along = np.sum(change * (source - behind), -1) / np.maximum(distance, 1e-9)
             wrong = np.abs(along - along.clip(0, distance))
@@ -364,7 +371,12 @@ def doubts(found: FoundBackground, samples: SmokeSamples, given: bool) -> list[F
     enough = len(samples.over_known) >= MIN_SAME_FRAMES
     if found.kind == "given" and enough and samples.standing > MAJORITY:
         said.append(doubt("given background never seen", {"fraction": samples.standing}))
-    elif found.background is not None and found.background.frame and samples.contrary > MAX_CONTRARY_FRACTION:
+    elif (
+        found.background is not None
+        and found.background.frame
+        and not hot_pixels(samples.colors, samples.behind).burn
+        and samples.contrary > MAX_CONTRARY_FRACTION
+    ):
         said.append(doubt("smoke in the given frame", {"fraction": samples.contrary}))
     covered = _covered_at_a_time(samples) / samples.covered.size
     if found.kind == "color" and samples.covered.mean() >= MIN_EVERYWHERE_FRACTION and covered > MAJORITY:

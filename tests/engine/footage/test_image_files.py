@@ -118,7 +118,7 @@ def test_opaque_and_empty_pictures_are_straight() -> None:
 @pytest.mark.parametrize("first", [0, 2])
 @pytest.mark.parametrize("channels", ["RGB", "RGBA"])
 def test_pictures_that_lack_the_alpha_of_the_others_are_no_solid_smoke(tmp_path, first, channels) -> None:
-    """Nor is a clip without alpha that begins so. Where alpha grows to all of a picture, it is smoke."""
+    """Nor is a clip without alpha that begins so. Where alpha grows to all of a picture, or begins so, it is smoke."""
     for n in range(8):
         picture = stored(IN_LIGHT, n, 0.7)
         if n in (first, first + 1):
@@ -127,9 +127,20 @@ def test_pictures_that_lack_the_alpha_of_the_others_are_no_solid_smoke(tmp_path,
         grown = np.full((HEIGHT, WIDTH, 4), 0.35 * n + 0.2).clip(0, 1)
         write_exr(tmp_path / f"b{n}.exr", {"RGBA": grown.astype(np.float32)})
     with Clip.open(tmp_path / "a#.exr", fps=24) as clip, Clip.open(tmp_path / "b#.exr", fps=24) as solid:
-        assert clip.damaged == (first, first + 1)
-        assert clip.alpha(first).mean() < 0.5
+        lacking = first > 0 or channels == "RGB"
+        assert clip.damaged == ((first, first + 1) if lacking else ())
+        assert (clip.alpha(first).mean() < 0.5) == lacking
         assert solid.damaged == ()
+
+
+def test_a_stray_alpha_and_a_value_that_is_not_finite_spoil_one_picture(tmp_path) -> None:
+    for n in range(8):
+        picture = np.full((HEIGHT, WIDTH, 4 if n == 0 else 3), 0.4, np.float32)
+        picture[0, 0] = np.nan if n == 5 else 0.3
+        write_exr(tmp_path / f"a{n}.exr", {"RGBA" if n == 0 else "RGB": picture})
+    with Clip.open(tmp_path / "a#.exr", fps=24) as clip:
+        assert clip.alpha_background is None
+        assert clip.damaged == (5,)
 
 
 @pytest.mark.parametrize("gray", [0.1, 0.715])

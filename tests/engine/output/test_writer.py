@@ -168,10 +168,10 @@ def test_another_version_of_what_computes_is_not_resumed(tmp_path, no_vdb) -> No
     """Nor another state of the same version, before anything is computed. A patch of Python computes the same."""
     cut_off(tmp_path, [1])
     index = json.loads((tmp_path / "sequence.json").read_text())
-    for name, resumes in (("numpy", False), ("code", False), ("python", True)):
+    for name, said in (("numpy", r"versions\.numpy"), ("code", "code"), ("python", "")):
         other = {**index, "versions": {**index["versions"], name: "1.0"}}
         (tmp_path / "sequence.json").write_text(json.dumps(other))
-        with nullcontext() if resumes else pytest.raises(SequenceError, match=rf"versions\.{name}"):
+        with pytest.raises(SequenceError, match=said) if said else nullcontext():
             check_directory(tmp_path, resume=True)
         assert Sequence.open(tmp_path).frames == (1,)
     write(tmp_path, [2], resume=True)

@@ -261,10 +261,11 @@ def test_a_given_background_that_the_clip_never_shows_is_said(tmp_path, smoke, f
     assert kinds(found, sample_smoke(found.clip, found.plate), given=True) == ["given background never seen"] * said
 
 
+@pytest.mark.parametrize("color", [0.6, (0.6, 0.3, 0.1)], ids=["gray", "orange"])
 @pytest.mark.parametrize("plate", [wall(0.2, 0.5), np.full((72, 56, 3), (0.2, 0.3, 0.5))], ids=["wall", "sky"])
-def test_a_given_frame_that_holds_smoke_is_said(tmp_path, plate) -> None:
+def test_a_given_frame_that_holds_smoke_is_said(tmp_path, plate, color) -> None:
     """What the smoke has left since changes the other way than what it has reached."""
-    with film(tmp_path, plate, lambda n: puff(n) * (n > 0), 0.6) as clip:
+    with film(tmp_path, plate, lambda n: puff(n) * (n > 0), color) as clip:
         for frame, said in ((0, False), (12, True)):
             found = find_background(clip, None, Background(frame=(frame,)))
             doubted = kinds(found, sample_smoke(found.clip, found.plate), given=True)
