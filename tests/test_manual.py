@@ -144,6 +144,26 @@ def test_examples_of_scene_files_are_read(tmp_path: Path) -> None:
         assert Scene.load(path).clip is not None
 
 
+def test_the_scene_reference_reads_docstrings() -> None:
+    meanings = scene_reference.attributes(Scene)
+    assert meanings["clip"] == "The footage."
+    assert meanings["background"] == meanings["camera"]
+    assert "Raises" not in "".join(meanings.values())
+
+
+def test_messages_are_found_in_the_code(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(messages, "ROOT", tmp_path)
+    module = tmp_path / "module.py"
+    module.write_text(
+        '"""A docstring is no message at all."""\n'
+        "def check(n, parser):\n"
+        '    parser.add_argument("--n", help="The number of all things.")\n'
+        '    if n < 0:\n        raise ValueError(f"{n}: is no number of things")\n'
+        '    return f"There are {n} things " + "in the box."\n'
+    )
+    assert messages.messages(module) == ["…: is no number of things", "There are … things in the box."]
+
+
 def test_every_package_has_its_topic() -> None:
     assert all(messages.all_messages().values())
     covered = [ROOT / folder for folders in messages.TOPICS.values() for folder in folders]

@@ -80,6 +80,18 @@ def test_a_share_of_the_smoke_is_white(known) -> None:
     assert take.given.lights[0].irradiance[0] == pytest.approx(take.gain * known.light.irradiance[0])
 
 
+def test_a_description_is_wrong_and_the_pictures_are_not(known) -> None:
+    plain = spoiled.taken(spoiled.usual(known))
+    turned = spoiled.wrong_light(known, 90)
+    x, y, z = known.light.direction
+    np.testing.assert_allclose(turned.given.lights[0].direction, (-y, x, z), atol=1e-6)
+    thicker = spoiled.wrong_extinction(known, 2)
+    assert thicker.given.medium.extinction == 2
+    assert spoiled.wrong_albedo(known, 2).given.medium.albedo == 1
+    assert spoiled.wrong_anisotropy(known, 0.5).given.medium.anisotropy == 0.5
+    assert all(np.array_equal(take.pictures, plain.pictures) for take in (turned, thicker))
+
+
 @pytest.mark.parametrize("depth", [0.01, 10])
 def test_smoke_has_its_optical_depth_and_the_exposure_follows(known, depth) -> None:
     take = smoke.optical_depth(known, depth)

@@ -111,6 +111,18 @@ def test_absorption_alone_is_exact_voxel_by_voxel(density, wall, depth):
     assert error_per_voxel(density, weights, *setup) < 1e-5
 
 
+def test_error_against_finite_differences_grows_with_thickness(density):
+    """Per voxel: first order in the optical depth while smoke is thin, no derivative at all once it is thick."""
+    weights = np.random.default_rng(7).random((16, 14, 3))
+    errors = {}
+    for depth in (0.01, 0.02, 3, 10):
+        setup = (CAMERAS["perspective"], DOMAIN, medium_of_depth(density, depth), (SUN,), np.zeros(3))
+        errors[depth] = error_per_voxel(density, weights, *setup)
+    assert errors[0.02] == pytest.approx(2 * errors[0.01], rel=0.1)
+    assert errors[0.01] < 0.02
+    assert 0.3 < errors[3] < errors[10]
+
+
 def test_thin_smoke_looks_and_derives_as_with_the_exact_renderer(density):
     """In the thin limit there is one picture and one derivative; the renderers sample it at different points."""
     far = replace(

@@ -10,7 +10,7 @@ import smokelift._core as _core
 from smokelift.density import DensitySettings, Observation, ObservedView, reconstruct_density
 from smokelift.density.descent import BLOCK, SHARED, descend
 from smokelift.density.hull import common_hull, project_voxels, visual_hull
-from smokelift.density.multiplicative import take_turns
+from smokelift.density.multiplicative import fit_multiplicative, take_turns
 from smokelift.density.objective import Fit, Term
 from smokelift.evaluation.metrics import psnr
 from smokelift.extraction.plate import Plate
@@ -72,6 +72,15 @@ def test_a_faint_rim_fades() -> None:
         assert densest[-3:].max() < np.median(densest[-9:-4])
 
 
+def test_smoke_fades_where_none_is_expected_in_depth(plume, small) -> None:
+    found = reconstruct_density(render(plume.densities[1], small), small, settings=QUICK)
+    deep = found.hull.sum(1) >= 8
+    first, last = found.hull.argmax(1)[deep], 23 - found.hull[:, ::-1].argmax(1)[deep]
+    rays = np.moveaxis(found.density, 1, 2)[deep]
+    ends = sum(np.take_along_axis(rays, at[:, None], 1)[:, 0] for at in (first, last))
+    assert ends.sum() < 0.002 * rays.sum()
+
+
 def test_smoke_through_floor_and_ceiling_makes_no_spikes() -> None:
     """A column of density 1 as high as the box is not much denser at its ends, where rays cross few of its voxels."""
     scene = Scene(
@@ -101,6 +110,29 @@ def term_of(scene: Scene, observation: Observation, hull: np.ndarray | None = No
 def filled(density: np.ndarray) -> _core.MarkedVoxels:
     """The voxels that hold any of it."""
     return _core.MarkedVoxels(density > 0)
+
+
+@pytest.mark.parametrize("before", [0.5, 2.0])
+def test_steps_lead_towards_plausible_smoke(plume, small, before) -> None:
+    """Of smoke in two halves in depth, the half that plausible smoke has more of gains more and loses less.
+
+    The picture is fitted all the same.
+    """
+    truth = plume.densities[1]
+    plausible = truth.copy()
+    plausible[:, :12] *= 0.5
+    plausible[:, 12:] *= 1.5
+    term = term_of(small, Observation(small.camera, render(truth, small)))
+    even, uneven = (
+        fit_multiplicative([term], np.float32(before) * truth, 6, 0.0, filled(truth), each)
+        for each in (None, plausible)
+    )
+    front, back = (
+        np.sum([fit.density[:, half] for fit in (even, uneven)], axis=(1, 2, 3))
+        for half in (slice(None, 12), slice(12, None))
+    )
+    assert back[1] / front[1] > 1.15 * back[0] / front[0]
+    assert uneven.loss < 1.2 * even.loss
 
 
 @pytest.mark.parametrize("even", [True, False])
@@ -300,23 +332,23 @@ def test_a_view_of_another_size_or_that_moves_is_refused(plume, small) -> None:
 
 
 @pytest.mark.parametrize(
-    "change",
+    ("change", "words"),
     [
-        {"image": np.full((42, 30, 3), np.nan)},
-        {"image": np.zeros((30, 42, 3))},
-        {"image": np.zeros((42, 30))},
-        {"initial": np.full((24, 24, 32), -1e-3)},
-        {"initial": np.full((24, 24, 32), np.nan)},
-        {"initial": np.zeros((24, 24, 31))},
-        {"camera": None},
-        {"domain": None},
-        {"camera": Camera.look_at((0, 0, 0.8), (0, 1, 0.8), fov_y_degrees=30, size=(30, 42))},
+        ({"image": np.full((42, 30, 3), np.nan)}, "not finite"),
+        ({"image": np.zeros((30, 42, 3))}, r"\(42, 30, 3\)"),
+        ({"image": np.zeros((42, 30))}, r"\(42, 30, 3\)"),
+        ({"initial": np.full((24, 24, 32), -1e-3)}, "holds negative"),
+        ({"initial": np.full((24, 24, 32), np.nan)}, "finite"),
+        ({"initial": np.zeros((24, 24, 31))}, "shape"),
+        ({"camera": None}, "no camera"),
+        ({"domain": None}, "no domain"),
+        ({"camera": Camera.look_at((0, 0, 0.8), (0, 1, 0.8), fov_y_degrees=30, size=(30, 42))}, "stands inside"),
     ],
 )
-def test_what_cannot_be_fitted_is_refused(small, change) -> None:
+def test_what_cannot_be_fitted_is_refused(small, change, words) -> None:
     given = {"image": np.zeros((42, 30, 3), np.float32)} | change
     scene = replace(small, **{name: given.pop(name) for name in ("camera", "domain") if name in given})
-    with pytest.raises(ValueError):
+    with pytest.raises(ValueError, match=words):
         reconstruct_density(scene=scene, **given)
 
 

@@ -9,11 +9,31 @@ import pytest
 import smokelift._core as _core
 from smokelift import Camera, Domain, Scene
 from smokelift.density import Observation, RoundDepth, ViewSet
-from smokelift.density.lattice_noise import Wander, lattices, stretched_noise
+from smokelift.density.lattice_noise import DEVIATION, NODE_BLUR, NODES, Wander, lattices, stretched_noise
 from smokelift.density.observation import eight_bit_plate
 from smokelift.density.texture import roughness
 from smokelift.render import render, scene_optics
 from smokelift.scene import Background, Medium, completed
+
+
+@pytest.mark.parametrize("axes", [1, 2, 3])
+def test_noise_has_unit_variance_between_nodes(axes) -> None:
+    """Over all of a lattice, whatever its axes; the mean is that of the nodes, and neither has a seam."""
+    random = np.random.default_rng(5)
+    places = random.uniform(-NODES, 2 * NODES, (axes, 20000))
+    found = [lattice.read(places) for lattice in lattices(1, 24, axes)]
+    assert np.mean([values.var() for values in found]) == pytest.approx(1, rel=0.1)
+    np.testing.assert_allclose(lattices(1, 1, axes)[0].read(places + NODES), found[0], atol=1e-6)
+
+
+def test_a_node_adds_what_a_blur_does_without_a_crease() -> None:
+    places = np.linspace(-NODES / 2, NODES / 2, 6401)[None]
+    (lattice,) = lattices(0, 1, 1)
+    one = lattice._replace(values=np.eye(1, NODES, dtype=np.float32)[0], corner=np.zeros(1))
+    added = one.read(places)
+    assert np.sqrt(np.average(places[0] ** 2, weights=added)) == pytest.approx(NODE_BLUR, rel=1e-3)
+    slopes = np.gradient(added, places[0])
+    assert np.abs(np.diff(slopes)).max() < 0.05 * np.abs(slopes).max()
 
 
 def test_compiled_code_reads_what_python_does() -> None:
@@ -77,6 +97,13 @@ def test_laminar_smoke_is_smooth() -> None:
     assert coarse < 0.6
 
 
+def test_noise_has_its_strengths() -> None:
+    noise = stretched_noise(level((64, 64, 64)), np.zeros(3), 4.0, (0.3, 0.4), 0)
+    assert noise.std() == pytest.approx(0.5, rel=0.1)
+    assert noise.mean() == pytest.approx(0, abs=0.05)
+    assert not stretched_noise(level((8, 8, 8)), np.zeros(3), WIDTH, NONE, 0).any()
+
+
 def test_noise_moves_with_the_smoke() -> None:
     shape = (12, 12, 24)
     before, after = (
@@ -101,6 +128,7 @@ def test_fine_octaves_are_drawn_out() -> None:
 
 
 WANDER = Wander(np.array([0.0, 0.0, 2.5]), 5.0, (0.8, 0.6, 0.4), 1)
+PLANE = np.stack(np.meshgrid(np.arange(160.0), np.arange(80.0), indexing="ij"))
 
 SCENE = Scene(
     camera=Camera.look_at((0, -8, 0.75), (0, 0, 0.75), fov_y_degrees=14, size=(32, 48)),
@@ -125,9 +153,48 @@ def spread_by(prior: RoundDepth, cameras: tuple[Camera, ...] = (SCENE.camera,), 
     return prior.estimate(ViewSet.of(seen, scene_optics(completed(SCENE)), frame)).density
 
 
+def middles(density: np.ndarray) -> np.ndarray:
+    """Mean depth (voxels) of the rays (lateral, height) through the column."""
+    part = density[13:19, :, 8:40].astype(np.float64)
+    return np.asarray(np.einsum("xyz,y->xz", part, np.arange(density.shape[1])) / part.sum(1))
+
+
+def depth(density: np.ndarray) -> float:
+    """Standard deviation (voxels) of the column's smoke in depth."""
+    row = density[13:19, :, 8:40].sum((0, 2), dtype=np.float64)
+    places = np.arange(len(row))
+    middle = places @ row / row.sum()
+    return float(np.sqrt((places - middle) ** 2 @ row / row.sum()))
+
+
+def test_middles_scatter_as_much_as_the_pictures_are_rough() -> None:
+    scatter = np.stack([replace(WANDER, seed=seed).offset(PLANE) for seed in range(8)])
+    assert WANDER.deviation == pytest.approx(DEVIATION * np.hypot(0.8, 0.6))
+    assert scatter.std((1, 2)).mean() == pytest.approx(WANDER.deviation, rel=0.15)
+    assert np.abs(np.diff(scatter, axis=0)).max((1, 2)).min() > 0.5, "another seed wanders otherwise"
+
+
+def test_scatter_travels_with_the_smoke() -> None:
+    frame = 6
+    height = 0.75 + frame * WANDER.velocity[2] * SCENE.domain.voxel_size
+    risen = Camera.look_at((0, -8, height), (0, 0, height), fov_y_degrees=14, size=SCENE.camera.size)
+    now, later = (
+        WANDER.scatter(camera, SCENE.domain, number).offset for camera, number in ((SCENE.camera, 0), (risen, frame))
+    )
+    np.testing.assert_allclose(later, now, atol=1e-4)
+
+
 def test_laminar_smoke_stands_straight() -> None:
     straight = replace(WANDER, roughness=(0.0, 0.0))
     np.testing.assert_array_equal(spread_by(RoundDepth(wander=straight)), spread_by(RoundDepth()))
+
+
+def test_wandering_smoke_is_as_deep_as_smoke_that_stands_on_the_axis() -> None:
+    round_smoke = spread_by(RoundDepth())
+    found = [spread_by(RoundDepth(wander=replace(WANDER, seed=seed))) for seed in range(16)]
+    assert middles(round_smoke).std() < 0.2
+    assert np.mean([middles(each).std() for each in found]) > 0.6 * WANDER.deviation * depth(round_smoke)
+    assert np.mean([depth(each) for each in found]) == pytest.approx(depth(round_smoke), rel=0.1)
 
 
 def test_smoke_that_two_cameras_see_stands_where_they_show_it() -> None:

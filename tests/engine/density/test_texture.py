@@ -11,13 +11,29 @@ from scipy import ndimage
 from smokelift import Camera, Domain, Medium, _core
 from smokelift.density import Observation
 from smokelift.density.observation import eight_bit_plate
-from smokelift.density.texture import ClipTexture, Exemplar, enlarged, fine_energy
+from smokelift.density.texture import SIZE, ClipTexture, Exemplar, enlarged, fine_energy
 from smokelift.render import Optics
 from smokelift.transport import block_means
 
 DOMAIN = Domain((-0.8, -0.6, 0), (0.8, 0.6, 1.6), (32, 24, 32))
 CAMERA = Camera.look_at((0, -6, 0.8), (0, 0, 0.8), fov_y_degrees=16, size=(36, 36))
 WHITE = np.ones(3, np.float32)
+
+
+def smoke(seed: int, fineness: float, shape: tuple[int, int] = (48, 64)) -> np.ndarray:
+    """Optical depth of a blob with detail of a size in pixels."""
+    random = np.random.default_rng(seed)
+    noise = ndimage.gaussian_filter(random.normal(size=shape), fineness)
+    x, z = (
+        np.arange(n)[:, None].T + 0.5 - n / 2 if k else np.arange(n)[:, None] + 0.5 - n / 2 for k, n in enumerate(shape)
+    )
+    blob = np.exp(-((np.hypot(x / 14, z / 22)) ** 4))
+    return np.asarray(blob * np.clip(1 + noise / noise.std(), 0, None), np.float32)
+
+
+def fine(picture: np.ndarray) -> float:
+    """How strong its detail is."""
+    return float(np.linalg.norm(picture - ndimage.gaussian_filter(picture, 1.5)) / np.linalg.norm(picture))
 
 
 def test_unfolding_and_folding_are_plain_slices_and_means() -> None:
@@ -55,6 +71,20 @@ def test_reducing_keeps_means_and_enlarging_keeps_lines() -> None:
     assert block_means(picture, 4).sum() * 16 == pytest.approx(picture.sum(), rel=1e-5)
     line = np.broadcast_to(np.arange(16, dtype=np.float32)[:, None], (16, 8)).copy()
     np.testing.assert_allclose(enlarged(block_means(line, 4), 4, line.shape)[2:14], line[2:14], atol=1e-5)
+
+
+@pytest.mark.parametrize("scale", [1, 2])
+def test_a_smooth_picture_takes_over_the_detail_of_an_exemplar(scale) -> None:
+    exemplar = Exemplar.of([smoke(seed, 1.5 * scale) for seed in range(4)], scale)
+    smooth = block_means(smoke(9, 12.0), scale)
+    like = block_means(smoke(8, 1.5 * scale), scale)
+    found = smooth
+    for turn in range(4):
+        found = exemplar.towards(found, turn)
+    assert fine(found) > 0.6 * fine(like)
+    assert fine(smooth) < 0.4 * fine(like)
+    kept = exemplar.towards(like, 0)
+    assert np.linalg.norm(kept - like) < 0.5 * np.linalg.norm(like - ndimage.gaussian_filter(like, SIZE / 2))
 
 
 def test_detail_that_stands_counts_and_level_layers_do_not() -> None:

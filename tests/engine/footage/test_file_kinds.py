@@ -1,5 +1,6 @@
 """Clips of all kinds, as a camera, a phone, a renderer or an accident makes them: read as they were encoded."""
 
+import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
@@ -284,6 +285,13 @@ def another_size(folder: Path) -> Path:
     return path
 
 
+def stray(folder: Path) -> Path:
+    """Pictures with one far behind the others."""
+    path = pictures(folder)
+    shutil.copy(folder / "f0004.png", folder / "f9999.png")
+    return path
+
+
 def cut(folder: Path, left: float, front: bool = False) -> Path:
     """A video of which a part is left, whose index is at its front or else at its end."""
     path = encoded(folder, options={"crf": "10", "g": "4"}, muxer={"movflags": "faststart"} if front else None)
@@ -309,35 +317,43 @@ def depth(folder: Path) -> Path:
     return folder / "z#.exr"
 
 
-REFUSED: dict[str, Callable[[Path], Path]] = {
-    "none": lambda folder: folder / "a.mp4",
-    "a folder": lambda folder: folder,
-    "an empty file": written("a.mp4"),
-    "no video": written("a.mp4", bytes(range(256)) * 40),
-    "one byte": written("a.mp4", b"x"),
-    "boxes that are no video's": written("a.mp4", b"\0\0\0\x08free" * 3),
-    "sound only": lambda folder: encode_sound(folder / "a.mp4"),
-    "no numbered pictures": lambda folder: folder / "f####.png",
-    "pictures of two numbers": lambda folder: pictures(folder).with_name("#_##.png"),
-    "a number that is not there": lambda folder: pictures(folder).with_name("f0009.png"),
-    "a star for numbers": lambda folder: pictures(folder).with_name("f*.png"),
-    "a format for numbers": lambda folder: folder / "f%04d.png",
-    "one picture of another size": another_size,
-    "pictures of depth": depth,
-    "pictures of Windows": lambda folder: written("b0.bmp")(folder).with_name("b#.bmp"),
-    "a recording that was cut short": partial(cut, left=0.2),
-    "a recording that was cut later": partial(cut, left=0.6),
-    "an index of which a half is left": partial(cut, left=0.05, front=True),
-    "six frames of eight zeroed": lambda folder: blanked(encoded(folder, "a.mov", "png", "rgb24"), range(1, 7)),
-    "says it is 30000 x 30000": lies,
+REFUSED: dict[str, tuple[Callable[[Path], Path], str]] = {
+    "none": (lambda folder: folder / "a.mp4", "no such file"),
+    "a folder": (lambda folder: folder, "is a folder"),
+    "an empty file": (written("a.mp4"), "is empty"),
+    "no video": (written("a.mp4", bytes(range(256)) * 40), "is not a video"),
+    "one byte": (written("a.mp4", b"x"), "is not a video"),
+    "boxes that are no video's": (written("a.mp4", b"\0\0\0\x08free" * 3), "is not a video"),
+    "sound only": (lambda folder: encode_sound(folder / "a.mp4"), "no video stream"),
+    "a stray picture far behind": (stray, "f0008.*missing"),
+    "no numbered pictures": (lambda folder: folder / "f####.png", "no such files"),
+    "pictures of two numbers": (lambda folder: pictures(folder).with_name("#_##.png"), "no such files"),
+    "a number that is not there": (lambda folder: pictures(folder).with_name("f0009.png"), "no such file"),
+    "a star for numbers": (
+        lambda folder: pictures(folder).with_name("f*.png"),
+        r"give numbered pictures as frame_####\.png",
+    ),
+    "a format for numbers": (lambda folder: folder / "f%04d.png", r"give numbered pictures as frame_####\.png"),
+    "one picture of another size": (another_size, "32 x 32 pixels.* 96 x 64"),
+    "pictures of depth": (depth, "z0.*holds neither RGB nor Y channels, but Z"),
+    "pictures of Windows": (lambda folder: written("b0.bmp")(folder).with_name("b#.bmp"), "is none of"),
+    "a recording that was cut short": (partial(cut, left=0.2), "breaks off"),
+    "a recording that was cut later": (partial(cut, left=0.6), "breaks off"),
+    "an index of which a half is left": (partial(cut, left=0.05, front=True), "breaks off"),
+    "six frames of eight zeroed": (
+        lambda folder: blanked(encoded(folder, "a.mov", "png", "rgb24"), range(1, 7)),  # each stands by itself
+        "6 of its 8 frames",
+    ),
+    "says it is 30000 x 30000": (lies, "its header says"),
 }
-"""Files that are refused."""
+"""Files that are refused, and why."""
 
 
 @pytest.mark.parametrize("name", REFUSED)
-def test_a_clip_that_cannot_be_used_is_refused_in_a_sentence_that_names_it(tmp_path, name) -> None:
-    path = REFUSED[name](tmp_path)
-    with pytest.raises(ClipError) as refused, Clip.open(path) as clip:
+def test_a_clip_that_cannot_be_used_is_refused_in_a_sentence(tmp_path, name) -> None:
+    make, why = REFUSED[name]
+    path = make(tmp_path)
+    with pytest.raises(ClipError, match=rf"^\S*: .*{why}|^\S*{why}") as refused, Clip.open(path) as clip:
         for _ in clip:
             pass
     assert "\n" not in str(refused.value) and str(refused.value).startswith(str(tmp_path))

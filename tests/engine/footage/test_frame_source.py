@@ -6,7 +6,7 @@ from PIL import Image
 
 from smokelift import Background, Clip
 from smokelift.extraction.find_background import find_background
-from smokelift.footage.frame_source import StoredPicture
+from smokelift.footage.frame_source import FrameSource, Layer, StoredPicture, alpha_background_of
 from smokelift.footage.image_files import code_values
 from smokelift.footage.images import area_average, linear_to_srgb, srgb_to_linear
 from tests.engine.films import encode
@@ -28,6 +28,23 @@ def test_exif(tmp_path, said) -> None:
         tags.get_ifd(0x8769)[0xA405] = said
     Image.new("RGB", (32, 16)).save(tmp_path / "a0.jpg", exif=tags)
     assert Clip.open(tmp_path / "a#.jpg").lens == (said or None)
+
+
+def layer(gray: float, alpha: float | None) -> Layer:
+    """Smoke of a linear gray over the left half."""
+    picture, opacity = np.zeros((4, 6, 3), np.float32), np.zeros((4, 6), np.float32)
+    picture[:, :3], opacity[:, :3] = gray * (1.0 if alpha is None else alpha), alpha or 0.0
+    return picture, None if alpha is None else opacity
+
+
+@pytest.mark.parametrize(("gray", "background"), [(0.05, 1.0), (0.9, 0.0)])
+def test_dark_smoke_stands_before_white_and_bright_smoke_before_black(gray, background) -> None:
+    clip = [layer(gray, 0.0), layer(gray, 0.5)]
+    source = FrameSource()
+    source.alpha_background = alpha_background_of(clip)
+    assert source.alpha_background == background
+    shown = source.shown(clip[1]).values
+    np.testing.assert_allclose(shown[0, [0, 5]], [[0.5 * gray + 0.5 * background] * 3, [background] * 3], rtol=1e-6)
 
 
 def test_the_background_of_alpha_is_taken_and_nothing_is_estimated(tmp_path) -> None:
@@ -61,7 +78,7 @@ def test_averages(picture, size) -> None:
     for part in (np.s_[:], np.s_[3:41, 5:60]):
         some = picture.cut(lambda pixels, part=part: pixels[part])
         assert np.array_equal(some.averaged(*size), area_average(picture.linear()[part], *size))
-    with pytest.raises(ValueError):
+    with pytest.raises(ValueError, match="pixel"):
         picture.averaged(4, 0)
 
 

@@ -11,6 +11,8 @@ from smokelift.output.images import write_image
 from smokelift.output.index import PICTURES
 from smokelift.output.preview import (
     MIN_ASPECT,
+    ORBIT_COLUMNS,
+    SHEET_ANGLES,
     SHEET_HEIGHT,
     STRIP_FRAMES,
     Preview,
@@ -23,6 +25,29 @@ from smokelift.scene import Background, Scene, orbit
 
 def preview(sequence: Sequence, scene: Scene) -> Preview:
     return Preview(sequence, Clip.open(scene.clip), frame_smoke(sequence))
+
+
+@pytest.mark.parametrize("count", [1, 5])
+def test_a_contact_sheet_has_the_input_and_every_view(plume, tmp_path, count) -> None:
+    sequence = at_rest(plume.scene, plume.densities[:count], tmp_path / "out")
+    rows, titles, labels = preview(sequence, plume.scene).contact_sheet()
+    assert len(labels) == len(rows) and 1 <= len(rows) <= count
+    for row in rows:
+        assert len(row) == len(titles) == 2 + len(SHEET_ANGLES)
+        assert {picture.shape for picture in row} == {row[0].shape} and len(row[0]) == SHEET_HEIGHT
+        assert all(picture.max() > 0.13 for picture in row)
+
+
+def test_an_orbit_shows_one_frame_from_twelve_angles(plume, tmp_path) -> None:
+    sequence = at_rest(plume.scene, plume.densities, tmp_path / "out")
+    shown = preview(sequence, plume.scene)
+    rows, titles, labels = shown.orbit()
+    assert [len(row) for row in rows] == [ORBIT_COLUMNS] * 2 == [len(titles)] * len(labels)
+    pictures = [picture for row in rows for picture in row]
+    assert all(picture.max() > 0.13 for picture in pictures)
+    camera = shown.framing.camera(sequence.scene.camera, SHEET_HEIGHT)
+    np.testing.assert_allclose(pictures[0], Viewer(sequence.scene, camera).image(4, plume.densities[3]), atol=1e-4)
+    assert np.abs(pictures[0] - pictures[6][:, ::-1]).max() > 0.02
 
 
 @pytest.mark.parametrize(("count", "columns"), [(1, 1), (5, 5), (9, STRIP_FRAMES)])
@@ -40,7 +65,9 @@ def test_a_strip_shows_consecutive_frames_from_the_side(plume, tmp_path, count, 
     assert top[0] - top[-1] == pytest.approx(rise * SHEET_HEIGHT / shown.framing.height, abs=10)
 
 
-def test_the_video_turns_while_it_plays(plume, tmp_path) -> None:
+def test_the_video_turns_while_it_plays(plume, tmp_path, monkeypatch) -> None:
+    for height in ("SHEET_HEIGHT", "PREVIEW_HEIGHT"):
+        monkeypatch.setattr(f"smokelift.output.preview.{height}", 112)
     still = [plume.densities[2]] * 5
     scene = plume.write(tmp_path / "clip", still, plume.scene)
     scene = replace(scene, clip=replace(scene.clip, fps=4.0))

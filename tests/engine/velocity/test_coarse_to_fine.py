@@ -7,7 +7,7 @@ import pytest
 
 from smokelift import Velocity, _core, estimate_velocity
 from smokelift.baselines.paper_method import PaperVelocity
-from smokelift.scene import Camera, Domain
+from smokelift.scene import SIDES, Camera, Domain
 from smokelift.transport import divergence, face_shapes
 from smokelift.velocity import CoarseToFine, DensityPair, PicturePair, ProjectedCG, VelocitySettings, predict_velocity
 from smokelift.velocity.coarse_to_fine import ONE_VIEW_SMOOTHNESS
@@ -19,6 +19,7 @@ from tests.engine.velocity.known_motions import (
     SHAPE,
     VOXEL,
     error_in_smoke,
+    mean_motion,
     positions,
     rotation,
     structured_density,
@@ -70,6 +71,19 @@ def test_an_estimate_of_one_view_is_smoother_and_corrected_by_its_pictures(estim
         expected = correct_by_optical_flow(CoarseToFine(smooth).estimate(pair), pictures, after, DT)
     for component, wanted in zip(found.faces, expected.faces, strict=True):
         np.testing.assert_array_equal(component, wanted)
+
+
+def test_a_coarser_grid_knows_inlets():
+    """They are put onto it: marked voxels are not taken for motion."""
+    before, after, truth = translation((0.8, 0.4, 1.2), (44, 44, 44), 10.0)
+    coarse = VelocitySettings(coarsening=1, solver=SMOOTH.solver)
+    inflow = np.zeros(after.shape, bool)
+    inflow[20:24, 20:24, 2:6] = True
+    marked, not_marked = (
+        error_in_smoke(estimate_velocity(before, after + 2 * inflow, DT, VOXEL, coarse, inflow=where), after, truth)
+        for where in (inflow, None)
+    )
+    assert marked < 0.7 * not_marked
 
 
 def test_an_estimate_on_a_coarser_grid_guides_the_next_one() -> None:
@@ -148,6 +162,14 @@ def test_prediction_is_free_of_divergence_and_keeps_a_uniform_flow():
     assert np.abs(divergence(predicted)).max() * VOXEL < 1e-4 * np.abs(predicted.centres()).max()
 
 
+def test_buoyancy_is_found_beside_a_prediction():
+    """Smoke that has gained speed since the prediction was made: the gain is fitted, not left to smoothness."""
+    before, after, truth = translation((0.0, 0.0, 1.0), **LARGE)
+    slower = uniform((0.0, 0.0, 0.7), before.shape)
+    found = estimate_velocity(before, after, DT, VOXEL, prediction=slower)
+    assert error_in_smoke(found, after, truth) < 0.5 * error_in_smoke(slower, after, truth)
+
+
 @pytest.mark.parametrize("noise", [0.01, 0.1])
 def test_noise_is_not_turbulence(noise):
     before, after, _ = rotation(0.15)
@@ -195,6 +217,14 @@ def test_a_chain_of_frames_settles():
         speeds.append(np.linalg.norm(voxels_per_frame(found), axis=-1).max() / largest)
     assert max(errors[3:]) < 0.85 * errors[0] < 0.65
     assert min(speeds[4:]) > 0.7 and max(speeds[4:]) < 1.6
+
+
+def test_the_velocity_is_found_in_a_box_of_walls():
+    before, after, _ = translation((0.5, -0.3, 0.6))
+    found = estimate_velocity(before, after, DT, VOXEL, closed=SIDES)
+    assert mean_motion(found, after) == pytest.approx((0.5, -0.3, 0.6), abs=0.2)
+    for axis, component in enumerate(found.faces):
+        assert not component.take((0, -1), axis).any()
 
 
 @pytest.mark.parametrize("prediction", [None, uniform((0.5, -0.5, 0.5), SHAPE)], ids=["alone", "predicted"])

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
+from smokelift.pipeline import compose
 from smokelift.scene import Camera, Domain, look_at_matrix
 from smokelift.scene.camera import project_points
-from smokelift.transport import Velocity, face_shapes, project
+from smokelift.setup.settings import Settings
+from smokelift.transport import Velocity, face_shapes, on_faces, project
 from smokelift.velocity.optical_flow import PicturePair, averaged_along, correct_by_optical_flow
 from tests.engine.transport.random_fields import random_velocity, uniform
 
@@ -56,6 +58,14 @@ def test_smoke_at_rest_is_moved_as_the_picture_moves(kind) -> None:
     assert abs(found[..., 1]).mean() < 0.1 * pixel
 
 
+def test_motion_along_the_line_of_sight_is_left() -> None:
+    towards = np.zeros((*COARSE, 3), np.float32)
+    towards[..., 1] = -0.5
+    velocity = Velocity(on_faces(towards), 2 * DOMAIN.voxel_size)
+    found = seen(velocity, 0.0, 0.0, "orthographic").centres()[BOX]
+    np.testing.assert_allclose(found[..., 1], -0.5, atol=0.02)
+
+
 def test_it_has_no_divergence_and_keeps_what_is_known() -> None:
     known = replace(rest(), closed=("z-",), figures={"trust": 0.5})
     found = seen(known, 0.6, 0.9, "perspective")
@@ -69,6 +79,11 @@ def test_a_picture_without_smoke_or_structure_corrects_nothing(picture: np.ndarr
     pictures = PicturePair(picture, picture, camera("perspective"), DOMAIN)
     found = correct_by_optical_flow(rest(), pictures, np.zeros(COARSE, np.float32), DT)
     assert not any(component.any() for component in found.faces)
+
+
+def test_the_paper_uses_no_optical_flow() -> None:
+    assert compose(Settings.preset()).optical_flow
+    assert not compose(Settings.preset(method="paper")).optical_flow
 
 
 @pytest.mark.parametrize("size", [(1, 1), (1, 9), (9, 1)])

@@ -31,6 +31,18 @@ def test_twice_as_fine_a_flow_has_no_divergence_and_stops_at_walls(shape, closed
         assert not fine.faces[axis].take(end, axis).any()
 
 
+def test_twice_as_fine_a_turning_flow_turns_as_it_did():
+    def turning(voxel: float, shape: tuple[int, int, int]) -> Velocity:
+        x, y = (voxel * (np.arange(n) + 0.5) for n in shape[:2])
+        faces = (y[None, :, None], -x[:, None, None], np.zeros((1, 1, 1)))
+        return Velocity(tuple(map(np.broadcast_to, faces, face_shapes(shape))), voxel)
+
+    fine = turning(1.0, (14, 12, 10))
+    inner = slice(4, 6)  # the ends are continued
+    for found, expected in zip(prolong(turning(2.0, (7, 6, 5)), fine.shape), fine.faces, strict=True):
+        np.testing.assert_allclose(found[inner, inner, inner], expected[inner, inner, inner], atol=1e-5)
+
+
 @pytest.mark.parametrize("shape", [(40, 36, 44), (41, 35, 43)])
 @pytest.mark.parametrize(
     "box", [(slice(13, 20), slice(0, 9), slice(30, 31)), (slice(0, 5), slice(11, 25), slice(14, 33))]

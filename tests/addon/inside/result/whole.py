@@ -13,7 +13,7 @@ from addon.core.contract import QUALITIES
 from addon.core.job import Job
 from addon.core.take import Take, takes
 from addon.result import shot_check, smoke_takes
-from addon.scene import look
+from addon.scene import look, volume
 from addon.scene.scene_file import emitted, shot_tables
 from addon.scene.smoke import activate
 from conftest import rendered, save_image
@@ -21,6 +21,7 @@ from smokelift.evaluation.metrics import psnr
 from smokelift.footage.clip import Clip
 from smokelift.footage.image_files import read_image
 from smokelift.footage.images import area_average, linear_to_srgb
+from smokelift.output.images import write_image
 from smokelift.output.sequence import Sequence
 from smokelift.scene import Scene, scene_from_dict
 from smokelift.setup.settings import Settings
@@ -135,6 +136,38 @@ def test_a_shot_of_which_only_the_clip_is_given_is_made(scene, tmp_path) -> None
     assert scene.camera.name == "Smokelift Camera"
 
 
+def test_a_camera_that_moves(shot, tmp_path) -> None:
+    """A blob filmed while the camera goes by: it stands still where it was, and a render looks like the clip."""
+    settings, camera = smoke(shot).smokelift, shot.camera
+    for frame, x in ((1, -0.4), (4, 0.4)):
+        camera.location.x = x
+        camera.keyframe_insert("location", frame=frame)
+    settings.first, settings.last, settings.longest_side, settings.plate_mode = 1, 4, LONGEST, "ESTIMATE"
+    known = scene_from_dict({**shot_tables(smoke(shot)), "medium": {"extinction": 3.0}})
+    points = np.stack(np.broadcast_arrays(*known.domain.offsets((0, 0, 0))), -1)
+    center = np.array([0.2, -0.1, 1.3])
+    blob = np.maximum(np.exp(-np.sum((points - center) ** 2, -1) / 0.3**2) - 0.05, 0).astype(np.float32)
+    for frame in range(4):
+        write_image(tmp_path / f"clip_{frame}.png", smokelift.render(blob, known, known.camera.at(frame)))
+    settings.clip = bpy.data.movieclips.load(str(tmp_path / "clip_0.png"))
+    settings.output = str(tmp_path / "out")
+    assert bpy.ops.smokelift.run() == {"FINISHED"}
+    (run,) = smoke_takes.runs
+    assert run.job.outcome == "done", run.job.sentence
+    sequence = Sequence.open(run.take.directory)
+    for number in sequence.frames:
+        found = np.average(points.reshape(-1, 3), axis=0, weights=sequence.density(number).ravel())
+        assert np.abs(found - center)[[0, 2]].max() < known.domain.voxel_size
+    assert bpy.ops.smokelift.set_up() == {"FINISHED"}
+    shot.render.resolution_percentage, shot.cycles.samples, shot.cycles.use_denoising = 10, 32, False
+    for frame in (1, 4):
+        shot.frame_set(frame)
+        picture = rendered(shot, tmp_path / "render.png")
+        with Clip.open(tmp_path / "clip_#.png", fps=24) as clip:
+            wanted = linear_to_srgb(area_average(clip.frame(frame - 1), *picture.shape[1::-1]))
+        assert psnr(picture, wanted) > WANTED_DB + 5
+
+
 def test_the_check_says_what_a_run_takes_and_assumes(shot) -> None:
     bpy.ops.smokelift.check()
     state = shot_check.state
@@ -157,21 +190,56 @@ def test_the_check_says_what_a_run_takes_and_assumes(shot) -> None:
     assert "no camera" in state.error
 
 
-def test_a_run_that_was_cut_off_goes_on_where_the_file_was_saved_elsewhere(shot, tmp_path) -> None:
-    project, elsewhere = tmp_path / "root" / "project", tmp_path / "root" / "elsewhere"
+def test_two_smokes_through_an_hour_of_work(shot, tmp_path) -> None:
+    """Two smokes, each with its clip: one made again after it was moved, one deleted, undone and resumed elsewhere."""
+    project = tmp_path / "root" / "project"
     shutil.copytree(EXAMPLE, project)
-    elsewhere.mkdir()
+    (project / "clip.mp4").rename(project / "left.mp4")
+    shutil.copy(EXAMPLE / "clip.mp4", project / "right.mp4")
     bpy.ops.wm.save_as_mainfile(filepath=str(project / "shot.blend"))
-    settings = smoke(shot).smokelift
-    settings.clip = bpy.data.movieclips.load(str(project / "clip.mp4"))
-    settings.first, settings.last, settings.longest_side = FIRST, FIRST + 1, 32
-    activate(smoke(shot), shot)
-    stopped = smoke_takes.write_take(smoke(shot))
+    left = smoke(shot)
+    left.smokelift.clip = bpy.data.movieclips.load(str(project / "left.mp4"))
+    assert bpy.ops.smokelift.add("INVOKE_DEFAULT", filepath=str(project / "right.mp4")) == {"FINISHED"}
+    right = bpy.context.view_layer.objects.active
+    for name in ("box", "camera_mode", "plate_mode", "plate", "light_mode", "quality"):
+        setattr(right.smokelift, name, getattr(left.smokelift, name))
+    for obj, first in ((left, FIRST), (right, LAST - 1)):
+        settings = obj.smokelift
+        settings.first, settings.last, settings.longest_side = first, first + 1, 32
+        activate(obj, shot)
+        assert bpy.ops.smokelift.run() == {"FINISHED"}
+    folders = [project / "smokelift" / name for name in ("left", "right")]
+    assert [volume.shown_take(obj) for obj in (left, right)] == [Take(folder / "take_0001") for folder in folders]
+    assert [obj.data.frame_start for obj in (left, right)] == [FIRST, LAST - 1]
+
+    activate(left, shot)
+    left.location.x += 2.0
+    assert bpy.ops.smokelift.run() == {"FINISHED"}
+    assert volume.shown_take(left) == Take(folders[0] / "take_0002")
+    assert left.location.x == pytest.approx(2.0)
+    assert volume.shown_take(right) == Take(folders[1] / "take_0001")
+
+    names = left.name, right.name
+    bpy.ops.ed.undo_push(message="Make Smoke")
+    left.location.x += 1.0
+    bpy.ops.ed.undo_push(message="Move")
+    bpy.data.objects.remove(right)
+    bpy.ops.ed.undo_push(message="Delete")
+    for _ in ("Delete", "Move"):
+        assert bpy.ops.ed.undo() == {"FINISHED"}
+    shot, (left, right) = bpy.context.scene, (bpy.data.objects[name] for name in names)  # undo makes all of them anew
+    assert left.location.x == pytest.approx(2.0)
+    shown = [volume.shown_take(obj).directory for obj in (left, right)]
+    assert shown == [folders[0] / "take_0002", folders[1] / "take_0001"]
+
+    activate(right, shot)
+    stopped = smoke_takes.write_take(right)
     known = Scene.load(stopped.scene_file)
     with Clip.open(known.clip) as clip:
         cut_off(smokelift.reconstruct(clip, known, Settings.preset("draft")), stopped.directory, 1)
-    smoke_takes.present(smoke(shot), stopped)
-    bpy.ops.wm.save_as_mainfile(filepath=str(elsewhere / "shot.blend"))
+    smoke_takes.present(right, stopped)
+    (tmp_path / "root" / "elsewhere").mkdir()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "root" / "elsewhere" / "shot.blend"))
     assert bpy.ops.smokelift.resume() == {"FINISHED"}
     job = smoke_takes.runs[-1].job
     assert (job.outcome, job.done) == ("done", 2), job.sentence

@@ -242,6 +242,29 @@ def test_a_new_result_replaces_the_old_one_and_what_was_changed_of_its_material_
     assert obj.data.display.density == 1.5
 
 
+def test_it_survives_saving_and_loading(shot, settings, tmp_path) -> None:
+    """Settings, smoke, material; the files are found relative to the .blend, also after the folder moved."""
+    home = tmp_path / "home"
+    home.mkdir()
+    bpy.ops.wm.save_as_mainfile(filepath=str(home / "shot.blend"))
+    settings.first, settings.last, settings.quality, settings.output = 3, 8, "fine", "//out"
+    shot.render.fps, settings.speed = 48, "REAL"
+    volume.show(smoke(shot), made(home / "out"))
+    assert smoke(shot).data.filepath == "//out/take_0001/smoke_0001.vdb"
+    bpy.ops.wm.save_mainfile()
+    moved = home.rename(tmp_path / "moved")
+    quietly(lambda: bpy.ops.wm.open_mainfile(filepath=str(moved / "shot.blend")))
+    scene = bpy.context.scene
+    settings = smoke(scene).smokelift
+    assert (settings.first, settings.last, settings.quality, settings.output) == (3, 8, "fine", "//out")
+    assert settings.clip.name == "clip.mp4"
+    assert settings.box.name == "Box"
+    assert volume.shown_take(smoke(scene)) == Take(moved / "out" / "take_0001")
+    assert plays(scene, 5) == 1
+    assert plays(scene, 7) == 2
+    assert look.node_of(smoke(scene)).inputs["Extinction"].default_value == 4.0
+
+
 def reopened(folder: Path) -> bpy.types.Scene:
     """Save the file in a folder and open it again; returns its scene."""
     folder.mkdir()
