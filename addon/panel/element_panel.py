@@ -109,7 +109,7 @@ def extract(context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     number = number_in_file(smoke.smokelift.clip, frame)
     picture = folder / PICTURES.replace("####", f"{number:04d}")
 
-    def show(_smoke: bpy.types.Object) -> str:
+    def show(smoke: bpy.types.Object) -> str:  # as it is by now: undo makes it anew
         image = bpy.data.images.load(str(picture), check_existing=True)
         image.reload()
         camera = camera_of_view(scene_of(smoke))

@@ -82,9 +82,7 @@ def show_plate_behind(smoke: bpy.types.Object, camera: bpy.types.Camera) -> None
     if plate is None:
         image.generated_color = (*Color(color[:3]).from_scene_linear_to_srgb(), 1.0)
     image[PICTURE_MARK] = True
-    picture = next(
-        (each for each in pictures if each.source == "IMAGE" and each.image and each.image.get(PICTURE_MARK)), None
-    )
+    picture = _marked(camera, PICTURE_MARK)
     if picture is None:
         if (clip := clip_behind(smoke, camera)) is not None:
             pictures.remove(clip)  # it would be below
@@ -119,7 +117,7 @@ def show_element_behind(camera: bpy.types.Camera, element: bpy.types.Image) -> N
 
 def element_behind(camera: bpy.types.Camera) -> bpy.types.CameraBackgroundImage | None:
     """The element in the view through a camera, shown or hidden; None without one."""
-    return next((each for each in camera.background_images if each.image and each.image.get(ELEMENT_MARK)), None)
+    return _marked(camera, ELEMENT_MARK)
 
 
 def clip_behind(smoke: bpy.types.Object, camera: bpy.types.Camera) -> bpy.types.CameraBackgroundImage | None:
@@ -127,6 +125,12 @@ def clip_behind(smoke: bpy.types.Object, camera: bpy.types.Camera) -> bpy.types.
     clip = smoke.smokelift.clip
     found = (each for each in camera.background_images if each.source == "MOVIE_CLIP" and each.clip == clip)
     return next(found, None)
+
+
+def _marked(camera: bpy.types.Camera, mark: str) -> bpy.types.CameraBackgroundImage | None:
+    """The picture in the view through a camera that has a mark; None without one."""
+    pictures = (each for each in camera.background_images if each.source == "IMAGE" and each.image)
+    return next((each for each in pictures if each.image.get(mark)), None)
 
 
 def _new_picture(camera: bpy.types.Camera, source: str) -> bpy.types.CameraBackgroundImage:

@@ -9,6 +9,7 @@ import sys
 import pytest
 
 import constants
+from tests.test_docs import ENGINE, ROOT
 
 COMMANDS = sorted(
     set(
@@ -28,6 +29,15 @@ def test_every_package_with_constants_set_by_hand_says_what_would_move_them() ->
     assert {name for name, rows in found if any(row.set_by == constants.BY_HAND for row in rows)} == set(
         constants.SWEEPS
     )
+
+
+def test_packages_are_those_of_the_engine_its_core_and_what_decides_in_the_addon() -> None:
+    found = constants.packages()
+    assert set(found) - {path.name for path in ENGINE.iterdir()} == {"addon", "cpp"}
+    assert {"MIN_OPACITY", "TOLERANCE", "PATIENCE_FAR"} <= {row.name for row in found["cpp"]}
+    names = {row.name for row in found["addon"]}
+    assert {"MATCHES", "GOOD_DEGREES", "SLOWEST, FASTEST"} <= names
+    assert not {"HOME", "PRESETS", "SINCE_5", "NEW_WIDTH"} & names
 
 
 def test_constants_of_the_core_have_the_comments_above_and_beside_them(tmp_path) -> None:
@@ -91,3 +101,10 @@ def test_a_module_may_name_the_source_of_its_constants(tmp_path) -> None:
         "[memory-and-time](experiments/memory-and-time.md)",
         constants.BY_HAND,
     ]
+
+
+def test_the_table_of_a_package_has_its_sweep_above() -> None:
+    page = constants.markdown()
+    velocity = page.partition("## velocity\n")[2]
+    assert velocity.index("benchmarks.velocity") < velocity.index("| module |")
+    assert "docs/" not in page and str(ROOT) not in page

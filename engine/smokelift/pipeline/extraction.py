@@ -15,7 +15,7 @@ from smokelift.footage.frame_source import is_pattern
 from smokelift.footage.images import Picture
 from smokelift.output.images import write_image
 from smokelift.scene import Scene
-from smokelift.setup.first_estimate import first_estimate, first_findings, is_given, sample_smoke
+from smokelift.setup.first_estimate import MAJORITY, first_estimate, first_findings, is_given, sample_smoke
 from smokelift.setup.illumination import source_radiance
 
 PATTERN = "element_####.exr"
@@ -141,7 +141,7 @@ def extract(clip: Clip, scene: Scene) -> Extraction:
         if estimate.hot.burn:
             doused = sample_smoke(without_fire(estimate.clip, estimate.plate), estimate.plate)
             # where most of the light goes with the fire, the smoke is not told apart from it
-            samples = doused if doused.change > 0.5 * samples.change else samples
+            samples = doused if doused.change > MAJORITY * samples.change else samples
         source = source_radiance(samples).astype(np.float32)
         if estimate.samples.smoky and not measured:
             findings.append(Finding("alpha of evenly lit smoke", about="alpha", source="assumed"))

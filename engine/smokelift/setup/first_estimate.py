@@ -41,7 +41,7 @@ MAX_BLACK = 0.001
 
 MAJORITY = 0.5
 """Fraction that is a majority: of the smoke's pixels, those whose background is unknown; of what bars enclose, the
-smoke of a frame; of what stands still, what is not a given background."""
+smoke of a frame; of what stands still, what is not a given background; of the light, what is not fire's."""
 
 MIN_BARS_FRACTION = 0.95
 """Fraction of what two bars enclose, covered at some time, from which it is the picture and no smoke: smoke that
